@@ -1,0 +1,1 @@
+//! Scene files of overfly: RON in, resolved settings out; presets.

@@ -1,0 +1,1 @@
+//! Geodesy, octahedron lattice, camera, datasource, LOD and mesh of overfly.

@@ -1,0 +1,1 @@
+//! Workers, job graph, parallel-for and spans: the only clock of overfly.

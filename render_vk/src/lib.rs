@@ -1,0 +1,1 @@
+//! Vulkan renderer of overfly: uploads, depth-range passes, parallel recording.

@@ -1,0 +1,1 @@
+//! Recorded flights of overfly: format, importers, digests.

@@ -1,0 +1,1 @@
+//! The terrain backend of a flight simulator.
