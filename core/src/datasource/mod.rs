@@ -1,0 +1,16 @@
+//! Where heights come from: pages of the octahedral square, resident or wanted.
+//!
+//! In:    arrived pages; what the LOD asks for.
+//! Out:   heights, normals, layers and bounds of resident pages.
+//! Keeps: the page pool.
+//! Not here: files and threads (the host's loader).
+
+pub mod generate;
+pub mod key;
+pub mod page;
+pub mod pages;
+#[path = "procedural_stub.rs"]
+pub mod procedural;
+
+pub use key::{PAGE_SIDE, PageKey};
+pub use page::Page;

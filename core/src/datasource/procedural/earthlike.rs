@@ -1,0 +1,227 @@
+//! The Earth-like planet: continents, mountain belts, eroded ridges, fine detail, climate.
+//!
+//! In:    the settings once, then unit surface normals.
+//! Out:   samples, and the terms of the planet's bounds.
+//! Keeps: lattices and amplitudes of every octave.
+//! Not here: the noise itself (`noise`), continents and belts (`outline`).
+
+use glam::DVec3;
+
+use super::bounds::{Bounds, Term};
+use super::noise::{Lattice, mix, ramp};
+use super::outline::Outline;
+use super::{Layers, ProceduralSettings, Sample, byte};
+
+/// The Earth-like planet.
+pub(super) struct Earthlike {
+    radius_m: f64,
+    /// Factor on heights that belong to the body as a whole; 1 on a planet of the Earth's size.
+    vertical: f64,
+    outline: Outline,
+    ridges: Vec<Ridge>,
+    gullies: Vec<Octave>,
+    details: Vec<Detail>,
+    moisture: [Lattice; 2],
+    weather: Lattice,
+    /// Slope at which gullies run straight downhill.
+    slope_scale: f64,
+}
+
+/// An octave that makes coasts everywhere and ridges in mountains.
+struct Ridge {
+    lattice: Lattice,
+    wavelength_m: f64,
+    coast_m: f64,
+    ridge_m: f64,
+}
+
+struct Octave {
+    lattice: Lattice,
+    wavelength_m: f64,
+    amplitude_m: f64,
+}
+
+struct Detail {
+    lattice: Lattice,
+    wavelength_m: f64,
+    /// Amplitude on the smoothest ground, and what full ruggedness adds.
+    fixed_m: f64,
+    rugged_m: f64,
+}
+
+const EARTH_RADIUS_M: f64 = 6_371_000.0;
+/// Largest amplitude of a ridge octave per wavelength; it tames bodies much smaller than the Earth.
+const STEEPEST: f64 = 0.10;
+/// Rounding of ridge crests, in units of noise.
+const CREST: f64 = 0.04;
+const UPLIFT_M: f64 = 1500.0;
+
+impl Earthlike {
+    pub(super) fn new(settings: &ProceduralSettings) -> (Earthlike, Bounds) {
+        let size = settings.radius_m / EARTH_RADIUS_M;
+        let half = size.sqrt();
+        let (quarter, eighth) = (half.sqrt(), half.sqrt().sqrt());
+        // Smaller bodies are relatively rougher: 40 m of relief on a radius of 1 km.
+        let vertical = settings.relief * half * eighth;
+        let finer = half * quarter * eighth;
+        let mut seed = settings.seed;
+        let mut next = || {
+            seed = mix(seed.wrapping_add(0x9E37_79B9_7F4A_7C15));
+            seed
+        };
+        let outline = Outline::new(settings.radius_m, size, next());
+        let ridges = ridge_octaves(300_000.0 * finer, vertical, &mut next);
+        let gully_start = ridges[ridges.len() - 1].wavelength_m * 0.8;
+        let gullies = gully_octaves(gully_start, 250.0 * half, settings.relief, &mut next);
+        let details = detail_octaves(gully_start, settings, &mut next);
+        let body = Earthlike {
+            radius_m: settings.radius_m,
+            vertical,
+            outline,
+            ridges,
+            gullies,
+            details,
+            moisture: [Lattice::new(3.0e6 * size, next()), Lattice::new(5.0e5 * finer, next())],
+            weather: Lattice::new(2.5e6 * size, next()),
+            slope_scale: 0.10 * settings.relief.max(1e-3),
+        };
+        let bounds = body.bounds();
+        (body, bounds)
+    }
+
+    pub(super) fn sample(&self, n: DVec3) -> Sample {
+        let at_m = n * self.radius_m;
+        let shape = self.outline.at(at_m, n);
+        let mut height_m = self.vertical * (shape.base_m + UPLIFT_M * shape.mountain);
+        let mut slope = DVec3::ZERO;
+
+        let mut crest = 1.0;
+        for octave in &self.ridges {
+            let (value, gradient) = octave.lattice.value_and_gradient(at_m);
+            height_m += octave.coast_m * value;
+            slope += gradient * octave.coast_m;
+            let rounded = (value * value + CREST * CREST).sqrt();
+            let ridge = 1.0 - 2.0 * rounded;
+            let amplitude_m = octave.ridge_m * shape.mountain * crest;
+            height_m += amplitude_m * ridge;
+            slope += gradient * (-2.0 * amplitude_m * value / rounded);
+            crest = (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * crest);
+        }
+
+        slope -= n * n.dot(slope);
+        for octave in &self.gullies {
+            let side = n.cross(slope);
+            let steep = side.length_squared();
+            let inverse = 1.0 / (steep + self.slope_scale * self.slope_scale).sqrt();
+            let (value, change) = octave.lattice.stripes(at_m, side * inverse);
+            let amplitude_m = octave.amplitude_m * shape.ruggedness * (steep.sqrt() * inverse);
+            height_m += amplitude_m * value;
+            slope += change * amplitude_m;
+        }
+
+        let steep = slope.length_squared();
+        let steep = steep / (steep + 0.06);
+        let mut local = 0.35 + 0.65 * steep;
+        for octave in &self.details {
+            let amplitude_m = octave.fixed_m + octave.rugged_m * shape.ruggedness * local;
+            let value = octave.lattice.value(at_m);
+            height_m += amplitude_m * value;
+            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
+        }
+        let layers = self.layers(at_m, n, height_m, (shape.mountain, shape.ruggedness, steep));
+        Sample { height_m, layers, ruggedness: shape.ruggedness }
+    }
+
+    fn layers(&self, at_m: DVec3, n: DVec3, height_m: f64, ground: (f64, f64, f64)) -> Layers {
+        let (mountain, ruggedness, steep) = ground;
+        let above_m = height_m.max(0.0) / self.vertical.max(1e-9);
+        let weather = self.weather.value(at_m);
+        // Sine of latitude squared: warm to 30 degrees, steep in the westerlies, cold caps.
+        let north = n.z * n.z;
+        let celsius = 29.0 - 52.0 * north + 6.0 * weather - 0.0065 * above_m;
+        let wet = self.moisture[0].value(at_m) + 0.4 * self.moisture[1].value(at_m);
+        let tropics = 1.0 - ramp(0.0, 0.12, north);
+        let deserts = ramp(0.05, 0.18, north) * (1.0 - ramp(0.25, 0.45, north));
+        let moist = 0.55 + 0.30 * tropics - 0.38 * deserts + 0.55 * wet
+            + 0.15 * mountain
+            - ramp(100.0, 1200.0, above_m) * 0.15;
+        let rock = 0.9 * steep + ramp(1800.0, 4200.0, above_m) * 0.45 + 0.1 * ruggedness;
+        Layers {
+            roughness: byte(ruggedness),
+            rock: byte(rock),
+            moisture: byte(moist),
+            temperature: byte((celsius + 40.0) / 80.0),
+        }
+    }
+
+    fn bounds(&self) -> Bounds {
+        let mut terms = Vec::new();
+        for o in &self.ridges {
+            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: o.coast_m, rugged_m: o.ridge_m });
+        }
+        for o in &self.gullies {
+            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: 0.0, rugged_m: o.amplitude_m });
+        }
+        for o in &self.details {
+            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: o.fixed_m, rugged_m: o.rugged_m });
+        }
+        Bounds { height_range_m: [-9000.0, 9000.0], ruggedness_slope_per_m: 1e-5, terms }
+    }
+}
+
+fn ridge_octaves(longest_m: f64, vertical: f64, next: &mut impl FnMut() -> u64) -> Vec<Ridge> {
+    let ridge_m = [500.0, 1000.0, 1500.0, 1300.0, 800.0];
+    let coast_m = [190.0, 120.0, 70.0, 40.0, 22.0];
+    let mut wavelength_m = longest_m;
+    let mut octaves = Vec::new();
+    for (ridge_m, coast_m) in ridge_m.into_iter().zip(coast_m) {
+        octaves.push(Ridge {
+            lattice: Lattice::new(wavelength_m, next()),
+            wavelength_m,
+            coast_m: (coast_m * vertical).min(0.04 * wavelength_m),
+            ridge_m: (ridge_m * vertical).min(STEEPEST * wavelength_m),
+        });
+        wavelength_m *= 0.5;
+    }
+    octaves
+}
+
+fn gully_octaves(
+    longest_m: f64,
+    shortest_m: f64,
+    relief: f64,
+    next: &mut impl FnMut() -> u64,
+) -> Vec<Octave> {
+    let mut wavelength_m = longest_m;
+    let mut octaves = Vec::new();
+    while wavelength_m >= shortest_m {
+        let lattice = Lattice::new(wavelength_m, next());
+        octaves.push(Octave { lattice, wavelength_m, amplitude_m: 0.05 * relief * wavelength_m });
+        wavelength_m *= 0.47;
+    }
+    octaves
+}
+
+fn detail_octaves(
+    longest_m: f64,
+    settings: &ProceduralSettings,
+    next: &mut impl FnMut() -> u64,
+) -> Vec<Detail> {
+    let mut wavelength_m = longest_m;
+    let mut octaves = Vec::new();
+    while wavelength_m >= settings.finest_m {
+        // Slopes are gentlest in kilometres, where gullies rule, and in decimetres.
+        let long = wavelength_m / (wavelength_m + 2000.0);
+        let short = 0.3 / (wavelength_m + 0.3);
+        let pebbles = 0.010 * ramp(8.0, 1.0, wavelength_m);
+        let per_m = 0.035 * (1.0 - 0.75 * long) * (1.0 - 0.5 * short);
+        octaves.push(Detail {
+            lattice: Lattice::new(wavelength_m, next()),
+            wavelength_m,
+            fixed_m: pebbles * settings.relief * wavelength_m,
+            rugged_m: per_m * settings.relief * wavelength_m,
+        });
+        wavelength_m /= 2.3;
+    }
+    octaves
+}

@@ -1,0 +1,259 @@
+//! Simplex gradient noise and slope-following stripes in three dimensions, without a period.
+//!
+//! In:    points in metres (any f64 below 1e15 wavelengths from the origin).
+//! Out:   values in -1..1, with gradients per metre where asked for.
+//! Keeps: nothing; a [`Lattice`] is its orientation, offset and seed.
+//! Not here: which octaves a planet has and what they add up to (`earthlike`, `cratered`).
+//! Source: K. Perlin, Noise hardware (2001); integer hashes instead of a permutation table.
+
+use glam::DVec3;
+
+/// 1.5 * 2^52: adding and subtracting it rounds to an integer without a call, and the sum's bits
+/// count up by one per integer, so they serve as lattice coordinates.
+pub(super) const ROUND: f64 = 6_755_399_441_055_744.0;
+const PRIME_X: u64 = 0x9E37_79B9_7F4A_7C15;
+const PRIME_Y: u64 = 0xC2B2_AE3D_27D4_EB4F;
+const PRIME_Z: u64 = 0x1656_67B1_9E37_79F9;
+/// Brings the largest value of the raw kernel sum to 1.
+const SCALE: f64 = 75.5;
+
+/// Half of the gradients; their covariance is a third of the identity, so no axis is favoured.
+const HALF_GRADIENTS: [[f64; 3]; 16] = [
+    [-0.789899888, -0.555841034, 0.259034577],
+    [-0.776049191, -0.445946436, -0.445958999],
+    [0.157993327, 0.699823835, 0.696623793],
+    [-0.453482995, 0.786932781, -0.418437535],
+    [-0.424130738, -0.150894050, -0.892941265],
+    [-0.210145137, 0.966627041, 0.146530495],
+    [0.426392658, 0.892432989, 0.147487837],
+    [-0.787414576, 0.258494239, -0.559606123],
+    [-0.457163807, -0.412871262, 0.787742709],
+    [-0.212636464, 0.152295266, 0.965190078],
+    [0.809821617, -0.080704588, -0.581098716],
+    [0.808283180, -0.583979377, -0.075142450],
+    [0.180402953, 0.877632085, -0.444090867],
+    [-0.999546061, -0.019790276, -0.022716012],
+    [-0.473882388, 0.625041447, 0.620289184],
+    [0.176358518, -0.439986681, 0.880516549],
+];
+
+static GRADIENTS: [[f64; 4]; 32] = with_opposites(&HALF_GRADIENTS);
+
+const fn with_opposites(half: &[[f64; 3]; 16]) -> [[f64; 4]; 32] {
+    let mut all = [[0.0; 4]; 32];
+    let mut i = 0;
+    while i < 16 {
+        let [x, y, z] = half[i];
+        all[i] = [x, y, z, 0.0];
+        all[i + 16] = [-x, -y, -z, 0.0];
+        i += 1;
+    }
+    all
+}
+
+/// One octave's lattice: how metres become cells, and which random field fills them.
+#[derive(Clone, Copy)]
+pub(super) struct Lattice {
+    rows: [DVec3; 3],
+    offset: DVec3,
+    cells_per_m: f64,
+    seed: u64,
+}
+
+/// The four corners of the simplex around a point: offsets to them and their hashes.
+struct Corners {
+    dx: [f64; 4],
+    dy: [f64; 4],
+    dz: [f64; 4],
+    hash: [u64; 4],
+}
+
+impl Lattice {
+    /// A randomly turned and shifted lattice of cells about `wavelength_m` apart. Every octave is
+    /// turned by itself, so that no direction of the lattices shows and none meet at the origin.
+    pub(super) fn new(wavelength_m: f64, seed: u64) -> Lattice {
+        let mut state = mix(seed ^ PRIME_Y);
+        let mut next = || {
+            state = mix(state.wrapping_add(PRIME_X));
+            unit(state) * 2.0 - 1.0
+        };
+        let mut in_ball = || loop {
+            let v = DVec3::new(next(), next(), next());
+            if (0.1..=1.0).contains(&v.length_squared()) {
+                return v;
+            }
+        };
+        let a = in_ball().normalize();
+        let mut b = a.cross(in_ball());
+        while b.length_squared() < 0.01 {
+            b = a.cross(in_ball());
+        }
+        let b = b.normalize();
+        let per_m = 1.0 / wavelength_m;
+        let rows = [a * per_m, b * per_m, a.cross(b) * per_m];
+        let offset = in_ball() * 1000.0;
+        Lattice { rows, offset, cells_per_m: per_m, seed: mix(seed ^ PRIME_Z) }
+    }
+
+    /// Smooth noise at a point in metres; -1..1, about 0 on average.
+    #[inline]
+    pub(super) fn value(&self, at_m: DVec3) -> f64 {
+        let c = self.corners(at_m);
+        let mut sum = [0.0; 4];
+        for i in 0..4 {
+            let g = gradient(c.hash[i]);
+            let t = kernel(&c, i);
+            let t2 = t * t;
+            sum[i] = t2 * t2 * (g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i]);
+        }
+        SCALE * ((sum[0] + sum[1]) + (sum[2] + sum[3]))
+    }
+
+    /// [`Lattice::value`] and its gradient per metre.
+    #[inline]
+    pub(super) fn value_and_gradient(&self, at_m: DVec3) -> (f64, DVec3) {
+        let c = self.corners(at_m);
+        let mut sum = 0.0;
+        let mut slope = DVec3::ZERO;
+        for i in 0..4 {
+            let g = gradient(c.hash[i]);
+            let t = kernel(&c, i);
+            let t2 = t * t;
+            let dot = g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i];
+            let fall = -8.0 * t2 * t * dot;
+            let t4 = t2 * t2;
+            sum += t4 * dot;
+            slope.x += t4 * g[0] + fall * c.dx[i];
+            slope.y += t4 * g[1] + fall * c.dy[i];
+            slope.z += t4 * g[2] + fall * c.dz[i];
+        }
+        (SCALE * sum, self.to_metres(slope * SCALE))
+    }
+
+    /// Stripes that run across `side` (a vector of length 0..1 in the axes of `at_m`): -1..1, and
+    /// the change per metre along `side`. A short `side` widens the stripes, zero makes one value
+    /// per blot. Random phases sit on the lattice, so stripes fork and join.
+    #[inline]
+    pub(super) fn stripes(&self, at_m: DVec3, side: DVec3) -> (f64, DVec3) {
+        let c = self.corners(at_m);
+        let across = DVec3::new(
+            self.rows[0].dot(side),
+            self.rows[1].dot(side),
+            self.rows[2].dot(side),
+        );
+        let turns_per_offset = TURNS_PER_CELL / self.cells_per_m;
+        let (mut weights, mut sum, mut slope) = (0.0, 0.0, 0.0);
+        for i in 0..4 {
+            let t = kernel(&c, i);
+            let w = t * t * t;
+            let phase = across.x * c.dx[i] + across.y * c.dy[i] + across.z * c.dz[i];
+            let turns = phase * turns_per_offset + unit(c.hash[i]);
+            weights += w;
+            sum += w * cosine(turns);
+            slope -= w * sine(turns);
+        }
+        let inverse = 1.0 / weights;
+        let per_m = TURNS_PER_CELL * core::f64::consts::TAU * self.cells_per_m;
+        (sum * inverse, side * (slope * inverse * per_m))
+    }
+
+    #[inline]
+    fn to_metres(&self, slope: DVec3) -> DVec3 {
+        self.rows[0] * slope.x + self.rows[1] * slope.y + self.rows[2] * slope.z
+    }
+
+    #[inline]
+    fn corners(&self, at_m: DVec3) -> Corners {
+        const SIXTH: f64 = 1.0 / 6.0;
+        const THIRD: f64 = 1.0 / 3.0;
+        let x = self.rows[0].dot(at_m) + self.offset.x;
+        let y = self.rows[1].dot(at_m) + self.offset.y;
+        let z = self.rows[2].dot(at_m) + self.offset.z;
+        let skew = (x + y + z) * THIRD - 0.5;
+        let (bx, by, bz) = (x + skew + ROUND, y + skew + ROUND, z + skew + ROUND);
+        let (fx, fy, fz) = (bx - ROUND, by - ROUND, bz - ROUND);
+        let unskew = (fx + fy + fz) * SIXTH;
+        let (x0, y0, z0) = (x - fx + unskew, y - fy + unskew, z - fz + unskew);
+        // Which coordinates are largest and which are not smallest orders the inner corners.
+        let (xy, yz, xz) = (x0 >= y0, y0 >= z0, x0 >= z0);
+        let first = [xy & xz, !xy & yz, !yz & !xz];
+        let second = [xy | xz, !xy | yz, !(yz & xz)];
+        let [i1, j1, k1] = first.map(f64::from);
+        let [i2, j2, k2] = second.map(f64::from);
+        let base = bx
+            .to_bits()
+            .wrapping_mul(PRIME_X)
+            .wrapping_add(by.to_bits().wrapping_mul(PRIME_Y))
+            .wrapping_add(bz.to_bits().wrapping_mul(PRIME_Z))
+            .wrapping_add(self.seed);
+        Corners {
+            dx: [x0, x0 - i1 + SIXTH, x0 - i2 + THIRD, x0 - 0.5],
+            dy: [y0, y0 - j1 + SIXTH, y0 - j2 + THIRD, y0 - 0.5],
+            dz: [z0, z0 - k1 + SIXTH, z0 - k2 + THIRD, z0 - 0.5],
+            hash: [
+                mix(base),
+                mix(base.wrapping_add(step(first))),
+                mix(base.wrapping_add(step(second))),
+                mix(base.wrapping_add(step([true; 3]))),
+            ],
+        }
+    }
+}
+
+/// Turns of a stripe phase per cell of its lattice, for a `side` of length 1.
+const TURNS_PER_CELL: f64 = 1.0;
+
+/// Scrambles 64 bits (the finaliser of splitmix64, shortened by one shift).
+#[inline]
+pub(super) fn mix(bits: u64) -> u64 {
+    let a = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (a ^ (a >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB)
+}
+
+/// The top 52 bits of a hash as a number in 0..1.
+#[inline]
+pub(super) fn unit(hash: u64) -> f64 {
+    f64::from_bits((hash >> 12) | 0x3FF0_0000_0000_0000) - 1.0
+}
+
+/// Nearest integer, ties to even.
+#[inline]
+pub(super) fn round(x: f64) -> f64 {
+    (x + ROUND) - ROUND
+}
+
+/// 0 up to `low`, 1 from `high`, a cubic with level ends between.
+#[inline]
+pub(super) fn ramp(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[inline]
+fn step(up: [bool; 3]) -> u64 {
+    let [x, y, z] = up.map(|b| u64::from(b).wrapping_neg());
+    (PRIME_X & x).wrapping_add(PRIME_Y & y).wrapping_add(PRIME_Z & z)
+}
+
+#[inline]
+fn gradient(hash: u64) -> &'static [f64; 4] {
+    &GRADIENTS[(hash >> 59) as usize]
+}
+
+#[inline]
+fn kernel(c: &Corners, i: usize) -> f64 {
+    let t = 0.5 - c.dx[i] * c.dx[i] - c.dy[i] * c.dy[i] - c.dz[i] * c.dz[i];
+    if t > 0.0 { t } else { 0.0 }
+}
+
+/// Parabolas in place of the sine of `turns` full turns; off by 0.06 at most, slopes continuous.
+#[inline]
+fn sine(turns: f64) -> f64 {
+    let u = turns - round(turns);
+    8.0 * u - 16.0 * u * u.abs()
+}
+
+#[inline]
+fn cosine(turns: f64) -> f64 {
+    sine(turns + 0.25)
+}

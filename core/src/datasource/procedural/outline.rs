@@ -1,0 +1,127 @@
+//! The outline of an Earth-like planet: where land, sea and mountain belts are.
+//!
+//! In:    a point in metres and its unit normal.
+//! Out:   a smooth [`Shape`]: base height, mountain mask, ruggedness.
+//! Keeps: the lattices of the longest waves and the level of the sea among them.
+//! Not here: anything shorter than 500 km on a planet of the Earth's size (`earthlike`).
+
+use glam::DVec3;
+
+use super::noise::{Lattice, mix, ramp, unit};
+
+/// The longest waves at one point.
+pub(super) struct Shape {
+    /// Height before mountains and coast detail, metres on a planet of the Earth's size.
+    pub base_m: f64,
+    /// 0 in plains and seas, 1 in the middle of a great range.
+    pub mountain: f64,
+    /// 0..1 and never below `mountain`.
+    pub ruggedness: f64,
+}
+
+/// Continents, basins and belts.
+pub(super) struct Outline {
+    warps: [(Lattice, f64); 2],
+    continents: [(Lattice, f64); 4],
+    belts: [Lattice; 2],
+    wiggle: Lattice,
+    breaks: Lattice,
+    uplands: Lattice,
+    /// Continent noise at the coast, and how much of it one unit of [`Outline::inland`] is.
+    coast: f64,
+    spread: f64,
+}
+
+/// Share of the planet under water.
+const SEA_SHARE: f64 = 0.655;
+
+impl Outline {
+    pub(super) fn new(radius_m: f64, size: f64, seed: u64) -> Outline {
+        let mut state = seed;
+        let mut lattice = |wavelength_km: f64| {
+            state = mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
+            Lattice::new(wavelength_km * 1000.0 * size, state)
+        };
+        let square = 1e12 * size * size;
+        let mut outline = Outline {
+            warps: [(lattice(6000.0), 0.09 * 36.0 * square), (lattice(1900.0), 0.06 * 3.6 * square)],
+            continents: [
+                (lattice(9500.0), 1.0),
+                (lattice(4700.0), 0.62),
+                (lattice(2300.0), 0.34),
+                (lattice(1150.0), 0.17),
+            ],
+            belts: [lattice(5200.0), lattice(3300.0)],
+            wiggle: lattice(1300.0),
+            breaks: lattice(2400.0),
+            uplands: lattice(1500.0),
+            coast: 0.0,
+            spread: 1.0,
+        };
+        let mut values: Vec<f64> = (0..4096u64).map(|i| outline.probe(radius_m, i)).collect();
+        values.sort_by(f64::total_cmp);
+        let rank = |share: f64| values[((share * 4096.0) as u16 & 0xFFF) as usize];
+        outline.spread = rank(0.95) - rank(0.05);
+        outline.coast = rank(SEA_SHARE);
+        outline
+    }
+
+    pub(super) fn at(&self, at_m: DVec3, n: DVec3) -> Shape {
+        let warped_m = self.warped(at_m, n);
+        let inland = (self.continent(warped_m) - self.coast) / self.spread;
+        let wiggle = 0.16 * self.wiggle.value(at_m);
+        let breaks = self.breaks.value(at_m);
+        let young = self.belt(0, warped_m, wiggle, 0.11) * (0.35 + 0.65 * ramp(-0.35, 0.15, breaks));
+        let old = self.belt(1, warped_m, wiggle, 0.09) * ramp(0.25, -0.35, breaks);
+        let land = ramp(-0.03, 0.10, inland);
+        let belts = 1.0 - (1.0 - young) * (1.0 - 0.5 * old);
+        let mountain = belts * land;
+        let upland = ramp(0.0, 0.6, self.uplands.value(at_m));
+        let plain = 0.03 + land * (0.03 + 0.16 * upland);
+        let rise = young * (1.0 - land);
+        let ruggedness = plain + (1.0 - plain) * mountain + 0.12 * rise;
+        let base_m = -4300.0
+            + 4180.0 * ramp(-0.22, -0.05, inland)
+            + 900.0 * ramp(-0.12, 0.50, inland)
+            + 250.0 * land * upland
+            + 1600.0 * rise * ramp(-0.08, -0.25, inland);
+        Shape { base_m, mountain, ruggedness }
+    }
+
+    /// A belt follows a zero of noise: 1 on it, 0 from `width` on, level at both.
+    fn belt(&self, which: usize, at_m: DVec3, wiggle: f64, width: f64) -> f64 {
+        let off = (self.belts[which].value(at_m) + wiggle) / width;
+        let inside = 1.0 - off * off;
+        if inside > 0.0 { inside * inside } else { 0.0 }
+    }
+
+    /// Swirls along the surface bend coasts and belts out of the roundness of plain noise.
+    fn warped(&self, at_m: DVec3, n: DVec3) -> DVec3 {
+        let mut warped_m = at_m;
+        for (lattice, reach_m2) in &self.warps {
+            let (_, gradient) = lattice.value_and_gradient(warped_m);
+            warped_m += (n.cross(gradient) + gradient * 0.5) * *reach_m2;
+        }
+        warped_m
+    }
+
+    fn continent(&self, warped_m: DVec3) -> f64 {
+        self.continents.iter().map(|(lattice, weight)| lattice.value(warped_m) * weight).sum()
+    }
+
+    /// Continent noise at one of many random points, to find the level that floods its share.
+    fn probe(&self, radius_m: f64, index: u64) -> f64 {
+        let mut state = mix(index.wrapping_mul(0xD134_2543_DE82_EF95));
+        loop {
+            let mut next = || {
+                state = mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
+                unit(state) * 2.0 - 1.0
+            };
+            let v = DVec3::new(next(), next(), next());
+            if (0.01..=1.0).contains(&v.length_squared()) {
+                let n = v.normalize();
+                return self.continent(self.warped(n * radius_m, n));
+            }
+        }
+    }
+}

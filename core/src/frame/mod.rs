@@ -1,0 +1,3 @@
+//! The frame.
+pub mod data;
+pub use data::{FrameCounts, FrameInput, FrameOutput, RangeDraws, ViewDraws};

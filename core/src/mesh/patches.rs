@@ -1,0 +1,121 @@
+//! The patch arena: one fixed-size slot of vertices for each leaf triangle.
+//!
+//! In:    slots taken and given back by `refine`; vertices written by `build`.
+//! Out:   vertices and bounds by slot.
+//! Keeps: columns of fixed capacity, a free list.
+//! Not here: how a vertex is computed (`build`), the shared index pattern (`topology`).
+
+use crate::geodesy::TwoFloat;
+use glam::DVec3;
+
+/// One vertex as it is uploaded: 40 bytes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(C)]
+pub struct PatchVertex {
+    /// Body-fixed position; the shader subtracts the eye.
+    pub position: TwoFloat,
+    /// Body-fixed ground normal, octahedral encoding, ±32767 is ±1.
+    pub normal_oct: [i16; 2],
+    /// Hidden layers: roughness, rock, moisture, temperature; 0 to 255.
+    pub layers: [u8; 4],
+    /// Height above the ellipsoid in metres.
+    pub height_m: f32,
+    /// Morph target and other later uses; zero.
+    pub reserved: f32,
+}
+
+const _: () = assert!(size_of::<PatchVertex>() == 40);
+
+impl PatchVertex {
+    /// A vertex of an empty slot.
+    pub const EMPTY: Self = Self {
+        position: TwoFloat { hi: [0.0; 3], lo: [0.0; 3] },
+        normal_oct: [0; 2],
+        layers: [0; 4],
+        height_m: 0.0,
+        reserved: 0.0,
+    };
+}
+
+/// Which leaf triangle a slot shows: diamond record and side.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Leaf {
+    /// Record of the diamond in the pool.
+    pub diamond: u32,
+    /// 0 or 1: which of its two triangles.
+    pub side: u8,
+}
+
+/// All patches, as columns by slot.
+pub struct Patches {
+    /// A leaf is 2^k triangles.
+    pub patch_depth: u8,
+    /// (n + 1)(n + 2)/2 with n = 2^(k/2) segments an edge.
+    pub vertices_per_patch: u32,
+    /// The leaf of each slot; `None` while the slot is free.
+    pub leaf: Vec<Option<Leaf>>,
+    /// Vertices of slot s: `s * vertices_per_patch ..` and as many on.
+    pub vertices: Vec<PatchVertex>,
+    /// Centre of the bounding sphere, ECEF metres.
+    pub centre: Vec<DVec3>,
+    /// Radius of the bounding sphere in metres.
+    pub radius_m: Vec<f64>,
+    /// Hash of leaf key and vertex bytes; 0 while free.
+    pub content: Vec<u64>,
+    free: Vec<u32>,
+    used_end: u32,
+}
+
+impl Patches {
+    /// An arena of `capacity` slots, all free.
+    pub fn new(patch_depth: u8, capacity: u32) -> Self {
+        let n = 1_u32 << (patch_depth / 2);
+        let vertices_per_patch = (n + 1) * (n + 2) / 2;
+        let slots = capacity as usize;
+        Self {
+            patch_depth,
+            vertices_per_patch,
+            leaf: vec![None; slots],
+            vertices: vec![PatchVertex::EMPTY; slots * vertices_per_patch as usize],
+            centre: vec![DVec3::ZERO; slots],
+            radius_m: vec![0.0; slots],
+            content: vec![0; slots],
+            free: Vec::with_capacity(slots),
+            used_end: 0,
+        }
+    }
+
+    /// Takes a free slot for `leaf`: the one given back last, else the first never used.
+    pub fn take(&mut self, leaf: Leaf) -> u32 {
+        let slot = self.free.pop().unwrap_or_else(|| {
+            self.used_end += 1;
+            self.used_end - 1
+        });
+        self.leaf[slot as usize] = Some(leaf);
+        slot
+    }
+
+    /// Gives a slot back.
+    pub fn give_back(&mut self, slot: u32) {
+        debug_assert!(self.leaf[slot as usize].is_some());
+        self.leaf[slot as usize] = None;
+        self.content[slot as usize] = 0;
+        self.free.push(slot);
+    }
+
+    /// Slots at and beyond this were never used.
+    pub fn used_end(&self) -> u32 {
+        self.used_end
+    }
+
+    /// Slots taken now.
+    pub fn live(&self) -> u32 {
+        self.used_end - u32::try_from(self.free.len()).expect("no more free slots than slots")
+    }
+
+    /// The vertices of one slot.
+    pub fn vertices_of(&self, slot: u32) -> &[PatchVertex] {
+        let n = self.vertices_per_patch as usize;
+        &self.vertices[slot as usize * n..][..n]
+    }
+}

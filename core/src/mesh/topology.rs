@@ -1,0 +1,57 @@
+//! The shared triangle pattern of every patch of one depth.
+//!
+//! In:    the patch depth k.
+//! Out:   barycentric positions of the vertices and the index pattern.
+//! Keeps: nothing.
+//! Not here: positions (`build`).
+//!
+//! Row r of n + 1 rows runs parallel to the hypotenuse; row 0 is the apex, row n the hypotenuse.
+
+/// Segments along each edge of a patch: 2^(k/2).
+pub fn segments(patch_depth: u8) -> u32 {
+    1 << (patch_depth / 2)
+}
+
+/// Place of vertex (row, column) in a patch, `column <= row`.
+pub fn vertex_index(row: u32, column: u32) -> u32 {
+    row * (row + 1) / 2 + column
+}
+
+/// Indices of the 2^k triangles, three each, counter-clockwise like the patch's own corners
+/// (apex, hypotenuse start, hypotenuse end).
+pub fn indices(patch_depth: u8) -> Vec<u32> {
+    let n = segments(patch_depth);
+    let mut list = Vec::with_capacity(3 << patch_depth);
+    for row in 0..n {
+        for column in 0..=row {
+            let [above, left, right] = [
+                vertex_index(row, column),
+                vertex_index(row + 1, column),
+                vertex_index(row + 1, column + 1),
+            ];
+            list.extend([above, left, right]);
+            if column < row {
+                list.extend([above, right, vertex_index(row, column + 1)]);
+            }
+        }
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_patch_has_two_to_the_k_triangles_over_all_its_vertices() {
+        for k in [0, 2, 4, 6, 8] {
+            let list = indices(k);
+            assert_eq!(list.len(), 3 << k);
+            let n = segments(k);
+            let mut used = list;
+            used.sort_unstable();
+            used.dedup();
+            assert_eq!(used.len() as u32, (n + 1) * (n + 2) / 2);
+        }
+    }
+}
