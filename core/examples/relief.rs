@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let view = View { planet: &planet, radius_m, style };
     paint_world(&view, &Path::new(folder).join(format!("{name}_world.png")))?;
-    let targets = [("coast", find(&view, is_coast)), ("peak", find(&view, |s| s.height_m))];
+    let targets = [("coast", find(&view, is_coast)), ("peak", find(&view, is_peak))];
     for (what, at) in targets {
         let sample = planet.sample(at);
         println!("{what}: {at} height {:.1} m", sample.height_m);
@@ -63,6 +63,11 @@ struct View<'a> {
 /// Prefers rugged ground at sea level.
 fn is_coast(sample: &Sample) -> f64 {
     sample.ruggedness.min(0.5) * 1000.0 - sample.height_m.abs()
+}
+
+/// Prefers height, and less so warmth, to see more than snow.
+fn is_peak(sample: &Sample) -> f64 {
+    sample.height_m * (0.3 + f64::from(sample.layers.temperature) / 255.0)
 }
 
 /// The best of many points spread over the planet.
@@ -138,7 +143,7 @@ fn shade(view: &View, here: &Sample, slope: (f64, f64), pixel_m: f64) -> Rgb<u8>
     let boost = if flat { boost * 0.4 } else { boost };
     let (dx, dy) = (slope.0 * boost, slope.1 * boost);
     let light = (0.5 * dx + 0.5 * dy + 0.7) / (1.0 + dx * dx + dy * dy).sqrt();
-    let light = 0.25 + 1.05 * light.max(0.0);
+    let light = 0.22 + 1.0 * light.max(0.0);
     let colour = match view.style {
         Style::Earthlike => earth_colour(here, view.radius_m),
         Style::Cratered => moon_colour(here),
@@ -160,8 +165,8 @@ fn earth_colour(here: &Sample, radius_m: f64) -> [f64; 3] {
     let soil = blend([0.78, 0.66, 0.44], grass, step(0.12, 0.40, moist));
     let cold = blend(soil, [0.45, 0.44, 0.34], step(6.0, -3.0, celsius));
     let bare = blend(cold, [0.46, 0.42, 0.38], step(0.35, 0.75, rock));
-    let snow = step(-1.0, -7.0, celsius) * (1.0 - 0.75 * step(0.55, 0.9, rock));
-    blend(bare, [0.95, 0.96, 0.98], snow)
+    let snow = step(-3.0, -9.0, celsius) * (1.0 - 0.75 * step(0.45, 0.8, rock));
+    blend(bare, [0.80, 0.82, 0.86], snow)
 }
 
 fn moon_colour(here: &Sample) -> [f64; 3] {

@@ -94,7 +94,7 @@ pub fn cross_of(point: IVec3, step: i32) -> [IVec3; 4] {
         return [on(1), north(inward.0, inward.1), on(-1), south(inward.0, inward.1)];
     }
     let (dx, dy) = (-step * x.signum(), -step * y.signum());
-    [north(dx, 0), north(0, dy), south(dx, 0), south(0, dy)]
+    [north(dx, 0), north(0, dy), south(0, dy), south(dx, 0)]
 }
 
 #[cfg(test)]

@@ -1,33 +1,47 @@
-//! One page: heights, normals, hidden layers and error bounds of a cell of the octahedral square.
+//! One page: heights, normals, hidden layers and bounds of a cell of the octahedral square.
 //!
 //! In:    filled by `generate`, on the host's loader threads.
-//! Out:   samples by (i, j); bounds by lattice position.
+//! Out:   samples by lattice point; bounds around a lattice point.
 //! Keeps: its own arrays.
 //! Not here: which pages are resident (`pages`).
 
 use super::key::{PAGE_SIDE, PageKey};
+use crate::lattice::unfold;
+use glam::IVec3;
 
 /// Samples of a page.
 pub const SAMPLES: usize = PAGE_SIDE * PAGE_SIDE;
-/// Bounds are kept for every fourth sample: 17 a side.
+/// Bounds are kept for every fourth sample.
 pub const BOUND_STRIDE: usize = 4;
 /// Bounds along one side of a page.
 pub const BOUND_SIDE: usize = (PAGE_SIDE - 1) / BOUND_STRIDE + 1;
 
-/// What is known about the ground around one place, beyond the samples.
+/// What is known about the ground around one place, between and below the samples.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-#[repr(C)]
 pub struct Bound {
-    /// Bound on the distance in height between the ground and this page's triangles where these
-    /// are the odd level's: longest edge 2 samples along an axis. Metres.
+    /// Bound on the height between the ground and this page's triangles of odd levels: longest
+    /// edge two samples along an axis. Includes the ellipsoid's sagitta. Metres.
     pub error_odd_m: f32,
-    /// The same for the even level's triangles: longest edge 1 sample diagonally.
+    /// The same for even levels: longest edge one sample diagonally.
     pub error_even_m: f32,
-    /// Bound on how much the height changes over one sample step, in metres: a slope.
+    /// Bound on the difference in height to any place that a descendant of a diamond drawn from
+    /// this page can reach. Metres.
     pub variation_m: f32,
 }
 
-/// One page. About 52 KiB, all of it inline.
+impl Bound {
+    fn max(self, other: Self) -> Self {
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        Self {
+            error_odd_m: max(self.error_odd_m, other.error_odd_m),
+            error_even_m: max(self.error_even_m, other.error_even_m),
+            variation_m: max(self.variation_m, other.variation_m),
+        }
+    }
+}
+
+/// One page: about 54 KiB, all of it inline.
+#[derive(Clone, PartialEq, Debug)]
 pub struct Page {
     /// Which cell.
     pub key: PageKey,
@@ -43,4 +57,37 @@ pub struct Page {
     pub height_range_m: [f32; 2],
     /// Hash of all of the above.
     pub content: u64,
+}
+
+impl Page {
+    /// Index of the sample at a lattice point of this page.
+    ///
+    /// # Panics
+    /// In debug builds, if the point is not a sample of this page.
+    pub fn sample_index(&self, point: IVec3) -> usize {
+        let (i, j) = self.cell(point, self.key.step());
+        j * PAGE_SIDE + i
+    }
+
+    /// The bound around a lattice point of this page: the worst of the kept ones that enclose it,
+    /// so that pages which share the point agree.
+    pub fn bound_at(&self, point: IVec3) -> Bound {
+        let (i, j) = self.cell(point, self.key.step());
+        let ends = |at: usize| [at / BOUND_STRIDE, at.div_ceil(BOUND_STRIDE)];
+        let mut worst = Bound::default();
+        for row in ends(j) {
+            for column in ends(i) {
+                worst = worst.max(self.bounds[row * BOUND_SIDE + column]);
+            }
+        }
+        worst
+    }
+
+    fn cell(&self, point: IVec3, step: i32) -> (usize, usize) {
+        let (u, v) = unfold(self.key.quadrant(), point);
+        let (u0, v0) = self.key.origin();
+        debug_assert!((u - u0) % step == 0 && (v - v0) % step == 0, "{point} is no sample");
+        let place = |along: i32| usize::try_from(along / step).expect("the point is in the page");
+        (place(u - u0), place(v - v0))
+    }
 }

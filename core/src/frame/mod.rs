@@ -1,3 +1,296 @@
-//! The frame.
+//! One frame, stage by stage, as nodes of the job graph: the table of contents of this crate.
+//!
+//! In:    [`FrameInput`] by [`Terrain::begin`].
+//! Out:   [`FrameOutput`] by [`Terrain::finish`].
+//! Keeps: [`Terrain`]: one cell a stage's state; the graph's order means that no lock ever waits.
+//! Not here: the stages' own work (`datasource`, `lod`, `mesh`), threads and clock (`jobs`).
+
 pub mod data;
+
 pub use data::{FrameCounts, FrameInput, FrameOutput, RangeDraws, ViewDraws};
+
+use crate::camera::{Camera, ViewFault};
+use crate::datasource::generate::Generator;
+use crate::datasource::pages::Pages;
+use crate::digest::Chain;
+use crate::limits::Limits;
+use crate::lod::operate::Surface;
+use crate::lod::queues::Queues;
+use crate::lod::refine::{PRIORITY_GRAIN, Scratch, prioritise_chunk, refine, settle};
+use crate::lod::screen_error::{Horizon, Sight};
+use crate::lod::{Diamonds, audit};
+use crate::mesh::build::{BLOCK, Block as BuildBlock, Ground, build_block, store};
+use crate::mesh::patches::Patches;
+use crate::mesh::place::{self, Block as PlaceBlock, empty_draws, join, place_block};
+use crate::settings::SceneSettings;
+use overfly_jobs::{Graph, Span, StageId, Team};
+use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+
+/// Names of the stages, in the order in which data moves.
+pub const STAGES: [Span; 6] = [CAMERA, ADMIT, PRIORITISE, REFINE, BUILD, PLACE];
+
+const CAMERA: Span = Span("camera");
+const ADMIT: Span = Span("datasource.admit");
+const PRIORITISE: Span = Span("lod.prioritise");
+const REFINE: Span = Span("lod.refine");
+const BUILD: Span = Span("mesh.build");
+const PLACE: Span = Span("mesh.place");
+
+/// Diamonds, their queues, and what `refine` keeps.
+pub struct Lod {
+    /// Every diamond with a record.
+    pub diamonds: Diamonds,
+    /// Split, merge and blocked queue.
+    pub queues: Queues,
+    scratch: Scratch,
+}
+
+#[derive(Default)]
+struct Eyes {
+    cameras: Vec<Camera>,
+    sights: Vec<Sight>,
+}
+
+/// The terrain of one scene: everything that lives from frame to frame.
+pub struct Terrain {
+    settings: SceneSettings,
+    limits: Limits,
+    horizon: Horizon,
+    input: Mutex<FrameInput>,
+    eyes: RwLock<Eyes>,
+    pages: RwLock<Pages>,
+    lod: RwLock<Lod>,
+    patches: RwLock<Patches>,
+    build_blocks: Mutex<Vec<BuildBlock>>,
+    place_blocks: Mutex<Vec<PlaceBlock>>,
+    output: Mutex<FrameOutput>,
+}
+
+impl Terrain {
+    /// The terrain of a scene, with no page yet; every pool is allocated here.
+    pub fn new(settings: &SceneSettings, generator: &Generator) -> Self {
+        let limits = Limits::of(settings);
+        let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
+        let ranges = settings.depth.splits_m.len() + 1;
+        Self {
+            horizon: Horizon::new(&settings.body, generator.planet().height_range_m()),
+            input: Mutex::default(),
+            eyes: RwLock::default(),
+            pages: RwLock::new(Pages::new(limits.pages)),
+            lod: RwLock::new(Lod {
+                diamonds: Diamonds::new(limits.diamonds),
+                queues: Queues::new(limits.diamonds),
+                scratch: Scratch::new(limits.diamonds),
+            }),
+            build_blocks: Mutex::new(BuildBlock::for_patches(
+                limits.built,
+                patches.vertices_per_patch,
+            )),
+            place_blocks: Mutex::new(PlaceBlock::for_patches(limits.leaves, ranges)),
+            patches: RwLock::new(patches),
+            output: Mutex::default(),
+            settings: settings.clone(),
+            limits,
+        }
+    }
+
+    /// The scene's settings.
+    pub fn settings(&self) -> &SceneSettings {
+        &self.settings
+    }
+
+    /// The capacities of all pools.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Takes the next frame's input; run the graph, then call [`Self::finish`].
+    ///
+    /// # Errors
+    /// A view that cannot be used: nothing was taken and the terrain is as it was.
+    pub fn begin(&self, input: &mut FrameInput) -> Result<(), ViewFault> {
+        input.views.iter().try_for_each(crate::camera::View::check)?;
+        core::mem::swap(&mut *self.input.lock(), input);
+        Ok(())
+    }
+
+    /// Hands over the frame's output, and takes the old one's memory for the next.
+    pub fn finish(&self, output: &mut FrameOutput) {
+        let mut own = self.output.lock();
+        core::mem::swap(&mut *own, output);
+        own.frame = output.frame + 1;
+    }
+
+    /// The patch arena, for a renderer's uploads.
+    pub fn patches(&self) -> RwLockReadGuard<'_, Patches> {
+        self.patches.read()
+    }
+
+    /// Diamonds and queues, for tests and tools.
+    pub fn lod(&self) -> RwLockReadGuard<'_, Lod> {
+        self.lod.read()
+    }
+
+    /// The resident pages, for tests and tools.
+    pub fn pages(&self) -> RwLockReadGuard<'_, Pages> {
+        self.pages.read()
+    }
+
+    /// Output of the frame in the making, for a stage after `mesh.place`.
+    pub fn output(&self) -> &Mutex<FrameOutput> {
+        &self.output
+    }
+
+    /// Holds every link, queue, page use and patch against each other.
+    ///
+    /// # Errors
+    /// What does not agree, in words.
+    pub fn audit(&self) -> Result<(), String> {
+        let (lod, pages, patches) = (self.lod.read(), self.pages.read(), self.patches.read());
+        audit::consistent(&lod.diamonds, &lod.queues, &pages, &patches)?;
+        audit::closed(&lod.diamonds, &patches)
+    }
+}
+
+/// Adds the stages to a graph whose context holds a terrain; returns the last stage.
+pub fn add_stages<C: Sync + 'static>(graph: &mut Graph<C>, terrain: fn(&C) -> &Terrain) -> StageId {
+    let camera = graph.stage(CAMERA, &[], move |c, _| see(terrain(c)));
+    let admit = graph.stage(ADMIT, &[], move |c, _| admit(terrain(c)));
+    let prioritise =
+        graph.stage(PRIORITISE, &[camera, admit], move |c, team| prioritise(terrain(c), team));
+    let refine = graph.stage(REFINE, &[prioritise], move |c, _| refine_surface(terrain(c)));
+    let build = graph.stage(BUILD, &[refine], move |c, team| build(terrain(c), team));
+    graph.stage(PLACE, &[build], move |c, team| place(terrain(c), team))
+}
+
+/// Cameras and sights of this frame's views.
+fn see(terrain: &Terrain) {
+    let input = terrain.input.lock();
+    let mut eyes = terrain.eyes.write();
+    let Eyes { cameras, sights } = &mut *eyes;
+    cameras.clear();
+    sights.clear();
+    cameras.extend(input.views.iter().map(|view| Camera::new(view, &terrain.settings.body)));
+    sights.extend(cameras.iter().map(|camera| Sight::new(camera, terrain.horizon)));
+}
+
+/// Arrived pages in, idle ones out.
+fn admit(terrain: &Terrain) {
+    let mut pages = terrain.pages.write();
+    let mut output = terrain.output.lock();
+    // The list of arrived pages is taken out of the input, so that `see` may read the views.
+    let mut arrived = core::mem::take(&mut terrain.input.lock().arrived);
+    output.evicted.clear();
+    let frame = output.frame;
+    let done = pages.admit(&mut arrived, frame, &mut output.evicted);
+    terrain.input.lock().arrived = arrived;
+    output.counts = FrameCounts {
+        admitted: done.admitted,
+        evicted: done.evicted,
+        refused: done.refused,
+        pages: pages.resident(),
+        ..FrameCounts::default()
+    };
+    output.digest.pages = pages.digest();
+}
+
+/// Every queued priority anew, in parallel over the pool.
+fn prioritise(terrain: &Terrain, team: &Team<'_>) {
+    let eyes = terrain.eyes.read();
+    let mut lod = terrain.lod.write();
+    let Lod { diamonds, queues, .. } = &mut *lod;
+    let used = diamonds.pool.used_end() as usize;
+    let regions = &diamonds.region.as_slice()[..used];
+    let priorities = &mut diamonds.priority_px.as_mut_slice()[..used];
+    team.for_each_chunk(priorities, PRIORITY_GRAIN, |first, out| {
+        prioritise_chunk((queues, regions), &eyes.sights, first, out);
+    });
+    terrain.output.lock().counts.evaluations = settle(diamonds, queues);
+}
+
+/// Splits and merges.
+fn refine_surface(terrain: &Terrain) {
+    let eyes = terrain.eyes.read();
+    let mut lod = terrain.lod.write();
+    let mut pages = terrain.pages.write();
+    let mut patches = terrain.patches.write();
+    let mut output = terrain.output.lock();
+    let Lod { diamonds, queues, scratch } = &mut *lod;
+    let mut surface = Surface {
+        diamonds,
+        queues,
+        pages: &mut pages,
+        patches: &mut patches,
+        sights: &eyes.sights,
+        body: &terrain.settings.body,
+        horizon: terrain.horizon,
+        lod: &terrain.settings.lod,
+        frame: output.frame,
+    };
+    let output = &mut *output;
+    output.wanted.clear();
+    let done = refine(&mut surface, terrain.limits.leaves, scratch, &mut output.wanted);
+    let counts = &mut output.counts;
+    counts.leaves = surface.diamonds.leaves;
+    counts.triangles = surface.diamonds.leaves << terrain.settings.lod.patch_depth;
+    counts.diamonds = surface.diamonds.pool.live();
+    counts.splits = done.splits;
+    counts.merges = done.merges;
+    counts.blocked = done.blocked;
+    counts.error_px_bound = done.error_px_bound;
+    counts.wanted = u32::try_from(output.wanted.len()).expect("a bounded list");
+    output.digest.mesh = surface.diamonds.digest();
+}
+
+/// Vertices of new leaves, in parallel over blocks of slots.
+fn build(terrain: &Terrain, team: &Team<'_>) {
+    let (lod, pages) = (terrain.lod.read(), terrain.pages.read());
+    let mut patches = terrain.patches.write();
+    let mut blocks = terrain.build_blocks.lock();
+    let mut output = terrain.output.lock();
+    output.built.clear();
+    patches.drain_fresh(&mut output.built);
+    let ground =
+        Ground { diamonds: &lod.diamonds, pages: &pages, body: &terrain.settings.body };
+    let slots = &output.built;
+    let used = &mut blocks[..slots.len().div_ceil(BLOCK)];
+    team.for_each_chunk(used, 1, |first, chunk| {
+        let from = first * BLOCK;
+        let to = slots.len().min(from + BLOCK);
+        build_block(&ground, &patches, &slots[from..to], &mut chunk[0]);
+    });
+    store(&mut patches, slots, used);
+    output.counts.built = u32::try_from(slots.len()).expect("slots are counted in u32");
+    output.digest.vertices = patches.digest();
+}
+
+/// Draws of every view, in parallel over chunks of slots.
+fn place(terrain: &Terrain, team: &Team<'_>) {
+    let eyes = terrain.eyes.read();
+    let patches = terrain.patches.read();
+    let mut blocks = terrain.place_blocks.lock();
+    let mut output = terrain.output.lock();
+    let depth = &terrain.settings.depth;
+    if output.views.len() != eyes.cameras.len() {
+        let draws = |camera: &Camera| empty_draws(*camera, depth, terrain.limits.leaves);
+        output.views = eyes.cameras.iter().map(draws).collect();
+    }
+    let used = &mut blocks[..(patches.used_end() as usize).div_ceil(place::CHUNK)];
+    let mut digest = Chain::default();
+    let mut drawn = 0;
+    for (view, camera) in output.views.iter_mut().zip(&eyes.cameras) {
+        view.camera = *camera;
+        for (range, (near_m, far_m)) in
+            view.ranges.iter_mut().zip(place::ranges_of(camera.near_m, depth))
+        {
+            (range.near_m, range.far_m) = (near_m, far_m);
+        }
+        team.for_each_chunk(used, 1, |first, chunk| {
+            place_block(&patches, view, first, &mut chunk[0]);
+        });
+        digest.add(join(used, view));
+        drawn += view.ranges.iter().map(|range| range.patches.len()).sum::<usize>();
+    }
+    output.counts.drawn = u32::try_from(drawn).expect("patches times ranges fits");
+    output.digest.draws = digest.0;
+}

@@ -62,8 +62,23 @@ pub struct Patches {
     pub radius_m: Vec<f64>,
     /// Hash of leaf key and vertex bytes; 0 while free.
     pub content: Vec<u64>,
+    /// Slots taken since vertices were last built, given back ones among them.
+    pub fresh: Vec<u32>,
+    is_fresh: Vec<bool>,
     free: Vec<u32>,
     used_end: u32,
+    digest: u64,
+}
+
+/// What `build` knows of one patch besides its vertices.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct BuiltPatch {
+    /// Centre of the bounding sphere, ECEF metres.
+    pub centre: DVec3,
+    /// Radius of the bounding sphere in metres.
+    pub radius_m: f64,
+    /// Hash of leaf key and vertices; never 0.
+    pub content: u64,
 }
 
 impl Patches {
@@ -80,8 +95,11 @@ impl Patches {
             centre: vec![DVec3::ZERO; slots],
             radius_m: vec![0.0; slots],
             content: vec![0; slots],
+            fresh: Vec::with_capacity(slots),
+            is_fresh: vec![false; slots],
             free: Vec::with_capacity(slots),
             used_end: 0,
+            digest: 0,
         }
     }
 
@@ -92,15 +110,45 @@ impl Patches {
             self.used_end - 1
         });
         self.leaf[slot as usize] = Some(leaf);
+        if !self.is_fresh[slot as usize] {
+            self.is_fresh[slot as usize] = true;
+            self.fresh.push(slot);
+        }
         slot
+    }
+
+    /// Hands over the slots to build, live ones only, in the order in which they were taken.
+    pub fn drain_fresh(&mut self, built: &mut Vec<u32>) {
+        for slot in self.fresh.drain(..) {
+            self.is_fresh[slot as usize] = false;
+            if self.leaf[slot as usize].is_some() {
+                built.push(slot);
+            }
+        }
     }
 
     /// Gives a slot back.
     pub fn give_back(&mut self, slot: u32) {
         debug_assert!(self.leaf[slot as usize].is_some());
         self.leaf[slot as usize] = None;
+        self.digest = self.digest.wrapping_sub(self.content[slot as usize]);
         self.content[slot as usize] = 0;
         self.free.push(slot);
+    }
+
+    /// Fills a live slot.
+    pub fn fill(&mut self, slot: u32, built: BuiltPatch, vertices: &[PatchVertex]) {
+        let (at, n) = (slot as usize, self.vertices_per_patch as usize);
+        self.vertices[at * n..][..n].copy_from_slice(vertices);
+        self.centre[at] = built.centre;
+        self.radius_m[at] = built.radius_m;
+        self.digest = self.digest.wrapping_sub(self.content[at]).wrapping_add(built.content);
+        self.content[at] = built.content;
+    }
+
+    /// Sum of the hashes of all live patches.
+    pub fn digest(&self) -> u64 {
+        self.digest
     }
 
     /// Slots at and beyond this were never used.

@@ -53,8 +53,19 @@ const EARTH_RADIUS_M: f64 = 6_371_000.0;
 /// Largest amplitude of a ridge octave per wavelength; it tames bodies much smaller than the Earth.
 const STEEPEST: f64 = 0.10;
 /// Rounding of ridge crests, in units of noise.
-const CREST: f64 = 0.04;
-const UPLIFT_M: f64 = 1500.0;
+const CREST: f64 = 0.06;
+/// The same for the slope that steers gullies, which must not turn within a gully's width.
+const STEERING_CREST: f64 = 0.20;
+/// Ruggedness from which gullies grow.
+const UNERODED: f64 = 0.07;
+/// Calibrated wavelengths of the outline as one octave, factors on the amplitudes of ridges (their
+/// crests are sharp) and gullies (they turn with the slope), and steepest change of ruggedness.
+const OUTLINE_KM: f64 = 450.0;
+const BELT_KM: f64 = 300.0;
+const RIDGE: f64 = 1.0;
+const GULLY: f64 = 1.8;
+const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.035;
+const UPLIFT_M: f64 = 700.0;
 
 impl Earthlike {
     pub(super) fn new(settings: &ProceduralSettings) -> (Earthlike, Bounds) {
@@ -62,7 +73,7 @@ impl Earthlike {
         let half = size.sqrt();
         let (quarter, eighth) = (half.sqrt(), half.sqrt().sqrt());
         // Smaller bodies are relatively rougher: 40 m of relief on a radius of 1 km.
-        let vertical = settings.relief * half * eighth;
+        let vertical = settings.relief * half * eighth.sqrt();
         let finer = half * quarter * eighth;
         let mut seed = settings.seed;
         let mut next = || {
@@ -85,7 +96,7 @@ impl Earthlike {
             weather: Lattice::new(2.5e6 * size, next()),
             slope_scale: 0.10 * settings.relief.max(1e-3),
         };
-        let bounds = body.bounds();
+        let bounds = body.bounds(size);
         (body, bounds)
     }
 
@@ -104,24 +115,28 @@ impl Earthlike {
             let ridge = 1.0 - 2.0 * rounded;
             let amplitude_m = octave.ridge_m * shape.mountain * crest;
             height_m += amplitude_m * ridge;
-            slope += gradient * (-2.0 * amplitude_m * value / rounded);
+            let broad = (value * value + STEERING_CREST * STEERING_CREST).sqrt();
+            slope += gradient * (-2.0 * amplitude_m * value / broad);
             crest = (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * crest);
         }
 
         slope -= n * n.dot(slope);
-        for octave in &self.gullies {
+        let eroded = shape.ruggedness - UNERODED;
+        // Plains and sea floor have no gullies, which saves a seventh of their time.
+        let gullies = if eroded > 0.0 { &self.gullies[..] } else { &[] };
+        for octave in gullies {
             let side = n.cross(slope);
             let steep = side.length_squared();
             let inverse = 1.0 / (steep + self.slope_scale * self.slope_scale).sqrt();
             let (value, change) = octave.lattice.stripes(at_m, side * inverse);
-            let amplitude_m = octave.amplitude_m * shape.ruggedness * (steep.sqrt() * inverse);
+            let amplitude_m = octave.amplitude_m * eroded * (steep * inverse * inverse);
             height_m += amplitude_m * value;
             slope += change * amplitude_m;
         }
 
         let steep = slope.length_squared();
-        let steep = steep / (steep + 0.06);
-        let mut local = 0.35 + 0.65 * steep;
+        let mut local = 0.35 + 0.65 * steep / (steep + 0.06);
+        let steep = steep / (steep + 0.16);
         for octave in &self.details {
             let amplitude_m = octave.fixed_m + octave.rugged_m * shape.ruggedness * local;
             let value = octave.lattice.value(at_m);
@@ -138,12 +153,12 @@ impl Earthlike {
         let weather = self.weather.value(at_m);
         // Sine of latitude squared: warm to 30 degrees, steep in the westerlies, cold caps.
         let north = n.z * n.z;
-        let celsius = 29.0 - 52.0 * north + 6.0 * weather - 0.0065 * above_m;
+        let polar = north * north * north * north;
+        let celsius = 30.0 - 36.0 * north - 18.0 * polar + 6.0 * weather - 0.0065 * above_m;
         let wet = self.moisture[0].value(at_m) + 0.4 * self.moisture[1].value(at_m);
         let tropics = 1.0 - ramp(0.0, 0.12, north);
         let deserts = ramp(0.05, 0.18, north) * (1.0 - ramp(0.25, 0.45, north));
-        let moist = 0.55 + 0.30 * tropics - 0.38 * deserts + 0.55 * wet
-            + 0.15 * mountain
+        let moist = 0.55 + 0.30 * tropics - 0.38 * deserts + 0.55 * wet + 0.15 * mountain
             - ramp(100.0, 1200.0, above_m) * 0.15;
         let rock = 0.9 * steep + ramp(1800.0, 4200.0, above_m) * 0.45 + 0.1 * ruggedness;
         Layers {
@@ -154,24 +169,46 @@ impl Earthlike {
         }
     }
 
-    fn bounds(&self) -> Bounds {
-        let mut terms = Vec::new();
-        for o in &self.ridges {
-            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: o.coast_m, rugged_m: o.ridge_m });
+    fn bounds(&self, size: f64) -> Bounds {
+        let octave = |wavelength_m, fixed_m, rugged_m| Term { wavelength_m, fixed_m, rugged_m };
+        let km = 1000.0 * size;
+        let mut terms = vec![
+            octave(OUTLINE_KM * km, 5300.0 * self.vertical, 0.0),
+            octave(BELT_KM * km, 0.0, UPLIFT_M * self.vertical),
+        ];
+        let ridges = self.ridges.iter();
+        terms.extend(ridges.map(|o| octave(o.wavelength_m, o.coast_m, RIDGE * o.ridge_m)));
+        let gullies = self.gullies.iter();
+        terms.extend(gullies.map(|o| octave(o.wavelength_m, 0.0, GULLY * o.amplitude_m)));
+        terms.extend(self.details.iter().map(|o| octave(o.wavelength_m, o.fixed_m, o.rugged_m)));
+        Bounds {
+            height_range_m: self.height_range_m(),
+            ruggedness_slope_per_m: RUGGEDNESS_SLOPE_PER_KM / km,
+            terms,
         }
-        for o in &self.gullies {
-            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: 0.0, rugged_m: o.amplitude_m });
-        }
-        for o in &self.details {
-            terms.push(Term { wavelength_m: o.wavelength_m, fixed_m: o.fixed_m, rugged_m: o.rugged_m });
-        }
-        Bounds { height_range_m: [-9000.0, 9000.0], ruggedness_slope_per_m: 1e-5, terms }
+    }
+
+    /// Every octave at its extreme at once. A ridge octave below its mean flattens those after it
+    /// to 0.45 of themselves, hence the share of the valleys.
+    fn height_range_m(&self) -> [f64; 2] {
+        let coasts_m: f64 = self.ridges.iter().map(|o| o.coast_m).sum();
+        let crests_m: f64 = self.ridges.iter().map(|o| o.coast_m.max(o.ridge_m)).sum();
+        let first_m = self.ridges[0].ridge_m;
+        let valleys_m = first_m + 0.45 * (crests_m - first_m);
+        let gullies_m: f64 = self.gullies.iter().map(|o| o.amplitude_m).sum();
+        let details_m =
+            |r: f64| self.details.iter().map(|o| o.fixed_m + o.rugged_m * r).sum::<f64>();
+        let [abyss_m, shore_m, inland_m] = Outline::RANGE_M.map(|m| m * self.vertical);
+        let sea_m = abyss_m - coasts_m - 0.2 * gullies_m - details_m(0.2);
+        let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0);
+        let peak_m = inland_m + UPLIFT_M * self.vertical + crests_m + gullies_m + details_m(1.0);
+        [sea_m.min(valley_m), peak_m]
     }
 }
 
 fn ridge_octaves(longest_m: f64, vertical: f64, next: &mut impl FnMut() -> u64) -> Vec<Ridge> {
-    let ridge_m = [500.0, 1000.0, 1500.0, 1300.0, 800.0];
-    let coast_m = [190.0, 120.0, 70.0, 40.0, 22.0];
+    let ridge_m = [400.0, 900.0, 1600.0, 1500.0, 950.0, 420.0];
+    let coast_m = [260.0, 160.0, 95.0, 58.0, 34.0, 20.0];
     let mut wavelength_m = longest_m;
     let mut octaves = Vec::new();
     for (ridge_m, coast_m) in ridge_m.into_iter().zip(coast_m) {
@@ -196,7 +233,7 @@ fn gully_octaves(
     let mut octaves = Vec::new();
     while wavelength_m >= shortest_m {
         let lattice = Lattice::new(wavelength_m, next());
-        octaves.push(Octave { lattice, wavelength_m, amplitude_m: 0.05 * relief * wavelength_m });
+        octaves.push(Octave { lattice, wavelength_m, amplitude_m: 0.050 * relief * wavelength_m });
         wavelength_m *= 0.47;
     }
     octaves
@@ -213,15 +250,16 @@ fn detail_octaves(
         // Slopes are gentlest in kilometres, where gullies rule, and in decimetres.
         let long = wavelength_m / (wavelength_m + 2000.0);
         let short = 0.3 / (wavelength_m + 0.3);
-        let pebbles = 0.010 * ramp(8.0, 1.0, wavelength_m);
+        // Plains roll gently; at arm's length even they have stones and tufts.
+        let plain = 0.0018 + 0.010 * (1.0 - ramp(1.0, 12.0, wavelength_m));
         let per_m = 0.035 * (1.0 - 0.75 * long) * (1.0 - 0.5 * short);
         octaves.push(Detail {
             lattice: Lattice::new(wavelength_m, next()),
             wavelength_m,
-            fixed_m: pebbles * settings.relief * wavelength_m,
+            fixed_m: plain * settings.relief * wavelength_m,
             rugged_m: per_m * settings.relief * wavelength_m,
         });
-        wavelength_m /= 2.3;
+        wavelength_m /= 2.5;
     }
     octaves
 }

@@ -96,7 +96,7 @@ impl Lattice {
     }
 
     /// Smooth noise at a point in metres; -1..1, about 0 on average.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value(&self, at_m: DVec3) -> f64 {
         let c = self.corners(at_m);
         let mut sum = [0.0; 4];
@@ -110,7 +110,7 @@ impl Lattice {
     }
 
     /// [`Lattice::value`] and its gradient per metre.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value_and_gradient(&self, at_m: DVec3) -> (f64, DVec3) {
         let c = self.corners(at_m);
         let mut sum = 0.0;
@@ -133,14 +133,11 @@ impl Lattice {
     /// Stripes that run across `side` (a vector of length 0..1 in the axes of `at_m`): -1..1, and
     /// the change per metre along `side`. A short `side` widens the stripes, zero makes one value
     /// per blot. Random phases sit on the lattice, so stripes fork and join.
-    #[inline]
+    #[inline(always)]
     pub(super) fn stripes(&self, at_m: DVec3, side: DVec3) -> (f64, DVec3) {
         let c = self.corners(at_m);
-        let across = DVec3::new(
-            self.rows[0].dot(side),
-            self.rows[1].dot(side),
-            self.rows[2].dot(side),
-        );
+        let across =
+            DVec3::new(self.rows[0].dot(side), self.rows[1].dot(side), self.rows[2].dot(side));
         let turns_per_offset = TURNS_PER_CELL / self.cells_per_m;
         let (mut weights, mut sum, mut slope) = (0.0, 0.0, 0.0);
         for i in 0..4 {
@@ -162,7 +159,7 @@ impl Lattice {
         self.rows[0] * slope.x + self.rows[1] * slope.y + self.rows[2] * slope.z
     }
 
-    #[inline]
+    #[inline(always)]
     fn corners(&self, at_m: DVec3) -> Corners {
         const SIXTH: f64 = 1.0 / 6.0;
         const THIRD: f64 = 1.0 / 3.0;

@@ -36,6 +36,10 @@ pub(super) struct Outline {
 const SEA_SHARE: f64 = 0.655;
 
 impl Outline {
+    /// Lowest base height anywhere and where there are mountains, and the highest; metres on a
+    /// planet of the Earth's size.
+    pub(super) const RANGE_M: [f64; 3] = [-4300.0, -150.0, 1290.0];
+
     pub(super) fn new(radius_m: f64, size: f64, seed: u64) -> Outline {
         let mut state = seed;
         let mut lattice = |wavelength_km: f64| {
@@ -44,7 +48,10 @@ impl Outline {
         };
         let square = 1e12 * size * size;
         let mut outline = Outline {
-            warps: [(lattice(6000.0), 0.09 * 36.0 * square), (lattice(1900.0), 0.06 * 3.6 * square)],
+            warps: [
+                (lattice(6000.0), 0.055 * 36.0 * square),
+                (lattice(1900.0), 0.035 * 3.6 * square),
+            ],
             continents: [
                 (lattice(9500.0), 1.0),
                 (lattice(4700.0), 0.62),
@@ -71,7 +78,8 @@ impl Outline {
         let inland = (self.continent(warped_m) - self.coast) / self.spread;
         let wiggle = 0.16 * self.wiggle.value(at_m);
         let breaks = self.breaks.value(at_m);
-        let young = self.belt(0, warped_m, wiggle, 0.11) * (0.35 + 0.65 * ramp(-0.35, 0.15, breaks));
+        let young = self.belt(0, warped_m, wiggle, 0.12 + 0.06 * breaks)
+            * (0.35 + 0.65 * ramp(-0.35, 0.15, breaks));
         let old = self.belt(1, warped_m, wiggle, 0.09) * ramp(0.25, -0.35, breaks);
         let land = ramp(-0.03, 0.10, inland);
         let belts = 1.0 - (1.0 - young) * (1.0 - 0.5 * old);
@@ -81,8 +89,8 @@ impl Outline {
         let rise = young * (1.0 - land);
         let ruggedness = plain + (1.0 - plain) * mountain + 0.12 * rise;
         let base_m = -4300.0
-            + 4180.0 * ramp(-0.22, -0.05, inland)
-            + 900.0 * ramp(-0.12, 0.50, inland)
+            + 3940.0 * ramp(-0.24, -0.03, inland)
+            + 1400.0 * ramp(-0.30, 0.60, inland)
             + 250.0 * land * upland
             + 1600.0 * rise * ramp(-0.08, -0.25, inland);
         Shape { base_m, mountain, ruggedness }

@@ -1,0 +1,92 @@
+//! How far a diamond and all its descendants reach, as pure functions of level and centre.
+//!
+//! In:    level and centre of a diamond.
+//! Out:   lattice distances and the chord of the covering cap of normals; page depth of a level.
+//! Keeps: nothing.
+//! Not here: heights and errors (`screen_error`).
+//!
+//! Lengths are Euclidean, on the octahedron, in units of the cell's side s = R/2^(level div 2).
+//! On a face one step along an axis of the square is √2 long, one along its steep diagonal √6.
+//! A kid's centre lies √2/2 from an even diamond's and √6/4 from an odd one's, and grandkids are
+//! half-size copies: so the geometric series 2·(√2/2 + √6/4) and 2·(√6/4 + √2/4) bound all
+//! descendants; 1 % is added, so that rounding cannot break the nesting.
+
+use crate::datasource::key::PAGE_BITS;
+use crate::lattice::RADIUS;
+use glam::IVec3;
+
+/// Reach of an even diamond's descendants from its centre.
+pub const EXTENT_EVEN: f64 = 1.01 * 2.639_1;
+/// Reach of an odd diamond's descendants from its centre.
+pub const EXTENT_ODD: f64 = 1.01 * 1.931_9;
+/// Longest edge of an even level's small triangles, in sample steps: one steep diagonal, √6.
+pub const EDGE_EVEN: f64 = 2.449_5;
+/// Longest edge of an odd level's small triangles: two steps along an axis, 2√2.
+pub const EDGE_ODD: f64 = 2.828_5;
+/// Least distance of the octahedron's surface from its centre: R/√3.
+pub const NORM_MIN: f64 = RADIUS as f64 / 1.732_050_807_568_877_3;
+
+/// Chord on the unit sphere from the diamond's normal to the farthest normal of a descendant.
+///
+/// Nested: a kid's cap lies within each of its parents' caps.
+pub fn cap_of(level: u8, centre: IVec3) -> f64 {
+    let side = f64::from(RADIUS >> (level / 2));
+    let extent = side * if level.is_multiple_of(2) { EXTENT_EVEN } else { EXTENT_ODD };
+    let norm = centre.as_dvec3().length() - extent;
+    extent / if norm > NORM_MIN { norm } else { NORM_MIN }
+}
+
+/// Depth of the sample grid whose points are the vertices of level-`level` patches, and the
+/// diamond's own centre: samples R/2^n apart.
+pub fn grid_depth(level: u8, patch_depth: u8) -> u8 {
+    let vertices = (level + patch_depth).div_ceil(2);
+    let centre = level / 2 + 1;
+    if vertices > centre { vertices } else { centre }
+}
+
+/// Depth of the page that serves a leaf triangle of this level.
+pub fn page_depth(level: u8, patch_depth: u8) -> u8 {
+    grid_depth(level, patch_depth).saturating_sub(PAGE_BITS)
+}
+
+/// Whether patches of this level use the page's finest grid: the page's bounds speak of them.
+pub fn page_is_finest(level: u8, patch_depth: u8) -> bool {
+    grid_depth(level, patch_depth) >= PAGE_BITS
+}
+
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::{fold, middle, normal_of};
+
+    /// All descendants' centres of a quad, to some depth, with their levels.
+    fn descend(quad: [IVec3; 4], level: u8, depth: u8, visit: &mut impl FnMut(IVec3, u8)) {
+        let centre = middle(quad[0], quad[2]);
+        visit(centre, level);
+        if depth == 0 {
+            return;
+        }
+        for edge in 0..4 {
+            let (a, b) = (quad[edge], quad[(edge + 1) % 4]);
+            let across = a + b - centre;
+            if across.abs().element_sum() == RADIUS {
+                descend([a, centre, b, across], level + 1, depth - 1, visit);
+            }
+        }
+    }
+
+    #[test]
+    fn caps_cover_all_descendants_and_are_nested() {
+        for (u, v) in [(4, 4), (4, 20), (12, 12), (20, 20), (44, 52), (60, 60)] {
+            let at = |du: i32, dv: i32| fold(0, (u + du) << 24, (v + dv) << 24);
+            let quad = [at(4, -4), at(4, 4), at(-4, 4), at(-4, -4)];
+            let (centre, level) = (middle(quad[0], quad[2]), 6);
+            let (normal, cap) = (normal_of(centre), cap_of(level, centre));
+            descend(quad, level, 8, &mut |point, deeper| {
+                let gap = (normal_of(point) - normal).length();
+                assert!(gap + cap_of(deeper, point) <= cap || deeper == level, "{point} {deeper}");
+            });
+        }
+    }
+}

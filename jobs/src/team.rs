@@ -1,0 +1,143 @@
+//! The parallel-for of a stage.
+//!
+//! In:    slices or an index range, a grain (elements per chunk), a body.
+//! Out:   the body called once per chunk, on this and on other workers.
+//! Keeps: nothing; a loop is over when the call returns.
+//! Not here: which stage runs when (`graph`), splitting and joining (`scope`).
+
+use crate::scope::{Chunks, Cursor};
+use crate::spans::{Log, Span, SpanRecord, now_ns};
+use crate::workers::Crew;
+use parking_lot::Mutex;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// The workers a stage may spread a loop over.
+///
+/// Chunks are the multiples of the grain, whatever the number of workers; the last may be short.
+/// Their order and their thread are not defined. A loop inside a chunk of a loop runs on the
+/// thread of that chunk. If a body panics, chunks not yet begun are left out and the panic goes on
+/// from the call.
+pub struct Team<'a> {
+    site: Option<Site<'a>>,
+}
+
+/// Where a stage runs.
+pub(crate) struct Site<'a> {
+    /// `None` while the workers serve another run.
+    pub(crate) crew: Option<&'a Crew>,
+    /// The worker that runs the stage.
+    pub(crate) lane: u16,
+    pub(crate) log: &'a Log,
+    pub(crate) span: Span,
+}
+
+impl Team<'static> {
+    /// A team of the caller only, for tests and for hosts without workers.
+    pub fn alone() -> Team<'static> {
+        Team { site: None }
+    }
+}
+
+impl<'a> Team<'a> {
+    /// The team of a stage of a graph.
+    pub(crate) fn of(site: Site<'a>) -> Team<'a> {
+        Team { site: Some(site) }
+    }
+}
+
+impl Team<'_> {
+    /// Number of workers that may help the one that runs the stage. Not for splitting: work split
+    /// by it would differ between machines.
+    pub fn workers(&self) -> usize {
+        self.site.as_ref().and_then(|site| site.crew).map_or(0, Crew::count)
+    }
+
+    /// Calls `body` for each chunk of `grain` elements with the index of its first element.
+    ///
+    /// # Panics
+    /// If `grain` is 0, or with the panic of a body.
+    pub fn for_each_chunk<T: Send>(
+        &self,
+        items: &mut [T],
+        grain: usize,
+        body: impl Fn(usize, &mut [T]) + Sync,
+    ) {
+        assert!(grain > 0, "a chunk holds at least one element");
+        let none: &mut [()] = &mut [];
+        let chunks = Chunks::new(items, none, grain, self.workers() + 1);
+        self.spread(chunks.cursor(), &|| chunks.drain(|first, items, _| body(first, items)));
+    }
+
+    /// Like [`Team::for_each_chunk`] over two slices of one length, cut at the same indices.
+    ///
+    /// # Panics
+    /// If the lengths differ, if `grain` is 0, or with the panic of a body.
+    pub fn for_each_chunk2<A: Send, B: Send>(
+        &self,
+        a: &mut [A],
+        b: &mut [B],
+        grain: usize,
+        body: impl Fn(usize, &mut [A], &mut [B]) + Sync,
+    ) {
+        assert!(grain > 0, "a chunk holds at least one element");
+        assert_eq!(a.len(), b.len(), "both slices have one length");
+        let chunks = Chunks::new(a, b, grain, self.workers() + 1);
+        self.spread(chunks.cursor(), &|| chunks.drain(&body));
+    }
+
+    /// Calls `body` for each index below `count`; an index is a chunk.
+    ///
+    /// # Panics
+    /// With the panic of a body.
+    pub fn for_each_index(&self, count: usize, body: impl Fn(usize) + Sync) {
+        let cursor = Cursor::new(count, (self.workers() + 1).min(count));
+        self.spread(&cursor, &|| cursor.drain(&body));
+    }
+
+    /// Runs `drain` here and on whoever takes a ticket. There are as many tickets, this thread's
+    /// included, as there are threads or chunks, whichever is less.
+    fn spread(&self, cursor: &Cursor, drain: &(dyn Fn() -> bool + Sync)) {
+        let Some(site) = &self.site else {
+            drain();
+            return;
+        };
+        let fault = Mutex::new(None);
+        let ticket = |worker: u16| {
+            let begin_ns = now_ns();
+            match catch_unwind(AssertUnwindSafe(drain)) {
+                Ok(false) => return,
+                Ok(true) => {}
+                Err(payload) => {
+                    cursor.stop();
+                    fault.lock().get_or_insert(payload);
+                }
+            }
+            let end_ns = now_ns();
+            site.log.ticket(SpanRecord { span: site.span, worker, begin_ns, end_ns });
+        };
+        match site.crew.map(|crew| (crew, crew.claim_loop(site.lane.into()))) {
+            None => ticket(site.lane),
+            Some((crew, Some(claim))) => {
+                let helpers = cursor.shares() - 1;
+                let job = |lane| ticket(lane_number(lane));
+                claim.open(&job, u32::from(lane_number(helpers)), || {
+                    crew.announce(helpers);
+                    ticket(site.lane);
+                });
+            }
+            // This is a loop inside a chunk: its time is part of the outer ticket's, whose worker
+            // it cannot know.
+            Some((_, None)) => {
+                drain();
+            }
+        }
+        if let Some(payload) = fault.into_inner() {
+            resume_unwind(payload);
+        }
+    }
+}
+
+/// A lane, or a number of lanes, as records store it.
+pub(crate) fn lane_number(lane: usize) -> u16 {
+    u16::try_from(lane).expect("there are at most 65 lanes")
+}
