@@ -1,1 +1,92 @@
 //! Scene files of overfly: RON in, resolved settings out; presets.
+//!
+//! In:    the text of a `scene.ron`, the path of one, or the name of a preset.
+//! Out:   [`SceneSettings`], or every fault of the file at once ([`SceneFaults`]).
+//! Keeps: nothing.
+//! Not here: what the settings do (`overfly_core`).
+//!
+//! The presets document the format: `presets/earth.ron` spells out every setting.
+#![forbid(unsafe_code)]
+
+mod fault;
+mod fields;
+mod scan;
+mod scene;
+mod tree;
+
+pub use fault::{Fault, FaultKind, LoadError, SceneFaults};
+pub use overfly_core::settings::SceneSettings;
+
+use fields::Reader;
+
+/// A scene that is compiled in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Preset {
+    /// The Earth with sea and sun; every setting is spelt out, all at their defaults.
+    Earth,
+    /// The Moon: craters, sun, no sea.
+    Moon,
+    /// A planet of 1 km radius with a sea, for tests and fast looks.
+    Small,
+}
+
+/// The names of the presets.
+pub const PRESETS: [&str; 3] = ["earth", "moon", "small"];
+
+impl Preset {
+    /// Every preset, in the order of [`PRESETS`].
+    pub const ALL: [Self; 3] = [Self::Earth, Self::Moon, Self::Small];
+
+    /// The preset of a name, one of [`PRESETS`].
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().zip(PRESETS).find(|(_, known)| *known == name).map(|(it, _)| it)
+    }
+
+    /// Its scene file.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Earth => include_str!("../presets/earth.ron"),
+            Self::Moon => include_str!("../presets/moon.ron"),
+            Self::Small => include_str!("../presets/small.ron"),
+        }
+    }
+}
+
+/// The scene file of a preset, as RON text.
+pub fn preset(name: &str) -> Option<&'static str> {
+    Preset::named(name).map(Preset::text)
+}
+
+/// The settings of a scene file's text. `file` is only for the faults to name.
+///
+/// Errors: every unknown, repeated or missing field, every wrong type and every value out of
+/// range, all at once; or where the text stops being RON.
+pub fn read(text: &str, file: &str) -> Result<SceneSettings, SceneFaults> {
+    let (root, syntax) = tree::parse(text);
+    let mut reader = Reader::new(text);
+    for fault in syntax {
+        reader.fault(fault.at, "", FaultKind::Syntax { what: fault.what });
+    }
+    let settings = root.as_ref().and_then(|root| scene::scene(&mut reader, root));
+    let faults = reader.into_faults();
+    match settings {
+        Some(settings) if faults.is_empty() => Ok(settings),
+        _ => {
+            assert!(!faults.is_empty(), "settings are only missing after a fault");
+            Err(SceneFaults { file: file.to_owned(), faults })
+        }
+    }
+}
+
+/// The settings of a preset or of a scene file.
+///
+/// - In: a name of [`PRESETS`], else a path; a file of such a name is reached as `./earth`.
+/// - Errors: the file cannot be read, or has faults.
+pub fn load(name_or_path: &str) -> Result<SceneSettings, LoadError> {
+    if let Some(text) = preset(name_or_path) {
+        return read(text, &format!("{name_or_path}.ron")).map_err(LoadError::Faults);
+    }
+    let text = std::fs::read_to_string(name_or_path)
+        .map_err(|source| LoadError::Read { file: name_or_path.to_owned(), source })?;
+    read(&text, name_or_path).map_err(LoadError::Faults)
+}

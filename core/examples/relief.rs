@@ -62,7 +62,7 @@ struct View<'a> {
 
 /// Prefers rugged ground at sea level.
 fn is_coast(sample: &Sample) -> f64 {
-    sample.ruggedness.min(0.5) * 1000.0 - sample.height_m.abs()
+    sample.ruggedness.min(0.3) * 60.0 - sample.height_m.abs()
 }
 
 /// Prefers height, and less so warmth, to see more than snow.
@@ -148,7 +148,12 @@ fn shade(view: &View, here: &Sample, slope: (f64, f64), pixel_m: f64) -> Rgb<u8>
         Style::Earthlike => earth_colour(here, view.radius_m),
         Style::Cratered => moon_colour(here),
     };
-    Rgb(colour.map(|c| (c * light * 255.0).clamp(0.0, 255.0) as u8))
+    Rgb(colour.map(|c| byte(c * light)))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "clamped to what a byte holds")]
+fn byte(share: f64) -> u8 {
+    (share * 255.0).clamp(0.0, 255.0) as u8
 }
 
 fn earth_colour(here: &Sample, radius_m: f64) -> [f64; 3] {

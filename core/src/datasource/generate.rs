@@ -11,7 +11,7 @@ use super::procedural::{Planet, Sample};
 use crate::digest::Chain;
 use crate::geodesy::{Ellipsoid, narrow};
 use crate::lattice::{cross_of, normal_of, signs, unfold};
-use crate::lod::reach::{EDGE_EVEN, EDGE_ODD, EXTENT_EVEN, NORM_MIN};
+use crate::lod::reach::{DIAGONAL, EXTENT_EVEN, NORM_MIN, edges};
 use crate::settings::SceneSettings;
 use glam::{DVec3, IVec3};
 
@@ -83,7 +83,7 @@ impl Generator {
     fn bound(&self, key: PageKey, point: IVec3, sample: &Sample) -> Bound {
         let step = f64::from(key.step());
         let leaf_side = step * f64::from(1_u32 << (self.patch_depth / 2));
-        let stride = EDGE_EVEN * step * 4.0;
+        let stride = DIAGONAL * step * 4.0;
         let reach = EXTENT_EVEN * leaf_side + stride;
         let norm = (point.as_dvec3().length() - reach).max(NORM_MIN);
         let [curvature_min, curvature_max] = self.body.curvature_radii_m();
@@ -95,10 +95,12 @@ impl Generator {
             let sagitta_m = edge_m * edge_m / (8.0 * curvature_min);
             narrow(self.planet.residual_m(edge_m, ruggedness) + sagitta_m)
         };
+        let [odd, even] = edges(self.patch_depth);
+        let extent_m = metres(EXTENT_EVEN * leaf_side);
         Bound {
-            error_odd_m: error(EDGE_ODD),
-            error_even_m: error(EDGE_EVEN),
-            variation_m: narrow(self.planet.variation_m(metres(EXTENT_EVEN * leaf_side), ruggedness)),
+            error_odd_m: error(odd),
+            error_even_m: error(even),
+            variation_m: narrow(self.planet.variation_m(extent_m, ruggedness)),
         }
     }
 

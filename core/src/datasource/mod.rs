@@ -9,7 +9,7 @@ pub mod generate;
 pub mod key;
 pub mod page;
 pub mod pages;
-#[path = "procedural_stub.rs"]
+
 pub mod procedural;
 
 pub use key::{PAGE_SIDE, PageKey};

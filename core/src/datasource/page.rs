@@ -19,10 +19,10 @@ pub const BOUND_SIDE: usize = (PAGE_SIDE - 1) / BOUND_STRIDE + 1;
 /// What is known about the ground around one place, between and below the samples.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Bound {
-    /// Bound on the height between the ground and this page's triangles of odd levels: longest
-    /// edge two samples along an axis. Includes the ellipsoid's sagitta. Metres.
+    /// Bound on the height between the ground and the triangles of odd levels that this page
+    /// serves, the ellipsoid's sagitta included. Metres.
     pub error_odd_m: f32,
-    /// The same for even levels: longest edge one sample diagonally.
+    /// The same for even levels.
     pub error_even_m: f32,
     /// Bound on the difference in height to any place that a descendant of a diamond drawn from
     /// this page can reach. Metres.

@@ -76,8 +76,8 @@ pub struct Planet {
 }
 
 enum Body {
-    Earthlike(Earthlike),
-    Cratered(Cratered),
+    Earthlike(Box<Earthlike>),
+    Cratered(Box<Cratered>),
 }
 
 impl Planet {
@@ -90,11 +90,11 @@ impl Planet {
         match settings.style {
             Style::Earthlike => {
                 let (body, bounds) = Earthlike::new(settings);
-                Planet { body: Body::Earthlike(body), bounds }
+                Planet { body: Body::Earthlike(Box::new(body)), bounds }
             }
             Style::Cratered => {
                 let (body, bounds) = Cratered::new(settings);
-                Planet { body: Body::Cratered(body), bounds }
+                Planet { body: Body::Cratered(Box::new(body)), bounds }
             }
         }
     }

@@ -9,7 +9,7 @@ use super::diamonds::{DiamondId, Diamonds, Node};
 use super::queues::{Queue, Queues};
 use crate::datasource::pages::Pages;
 use crate::geodesy::TwoFloat;
-use crate::lattice::key_of;
+use crate::lattice::{key_of, middle};
 use crate::mesh::patches::Patches;
 use crate::mesh::topology::{indices, segments};
 use glam::IVec3;
@@ -157,41 +157,45 @@ pub fn closed(diamonds: &Diamonds, patches: &Patches) -> Result<(), String> {
     if triangles.is_empty() {
         return Ok(());
     }
-    let mut edges: BTreeMap<(u64, u64), [u32; 2]> = BTreeMap::new();
-    let mut vertices: BTreeMap<u64, IVec3> = BTreeMap::new();
+    let mut edges = Vec::with_capacity(3 * triangles.len());
+    let mut vertices = Vec::with_capacity(3 * triangles.len());
     for triangle in &triangles {
         for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (triangle[a], triangle[b])) {
             let (a, b) = (key_of(from), key_of(to));
-            vertices.insert(a, from);
-            let direction = usize::from(a > b);
-            edges.entry((a.min(b), a.max(b))).or_default()[direction] += 1;
+            vertices.push(a);
+            edges.push((a.min(b), a.max(b), a > b, key_of(middle(from, to))));
         }
     }
-    for (&(a, b), &used) in &edges {
-        let middle = crate::lattice::middle(vertices[&a], vertices[&b]);
-        ensure(used == [1, 1], || format!("edge {a:x}-{b:x} is used {used:?} times"))?;
-        let hit = middle != vertices[&a] && vertices.contains_key(&key_of(middle));
+    vertices.sort_unstable();
+    vertices.dedup();
+    edges.sort_unstable();
+    for pair in edges.chunks(2) {
+        let (a, b, _, within) = pair[0];
+        let twice = pair.len() == 2 && pair[1].0 == a && pair[1].1 == b && pair[0].2 != pair[1].2;
+        ensure(twice, || format!("edge {a:x}-{b:x} is not used once in each direction"))?;
+        let hit = within != a && within != b && vertices.binary_search(&within).is_ok();
         ensure(!hit, || format!("a vertex lies within edge {a:x}-{b:x}"))?;
     }
-    let (v, e, f) = (vertices.len(), edges.len(), triangles.len());
+    let (v, e, f) = (vertices.len(), edges.len() / 2, triangles.len());
     ensure(v + f == e + 2, || format!("V − E + F = {v} − {e} + {f} is not 2"))?;
     one_position_each(diamonds, patches)
 }
 
 fn one_position_each(diamonds: &Diamonds, patches: &Patches) -> Result<(), String> {
-    let mut positions: BTreeMap<u64, TwoFloat> = BTreeMap::new();
+    let mut positions = Vec::new();
     for id in diamonds.ids() {
         let node = &diamonds.node[id];
         for side in 0..2 {
             let Some(slot) = node.patches[side] else { continue };
             let points = lattice_points(node.shape.triangle(side), patches.patch_depth);
             for (point, vertex) in points.into_iter().zip(patches.vertices_of(slot)) {
-                let kept = positions.entry(key_of(point)).or_insert(vertex.position);
-                let same = kept.hi.map(f32::to_bits) == vertex.position.hi.map(f32::to_bits)
-                    && kept.lo.map(f32::to_bits) == vertex.position.lo.map(f32::to_bits);
-                ensure(same, || format!("{point} has two positions"))?;
+                let TwoFloat { hi, lo } = vertex.position;
+                positions.push((key_of(point), hi.map(f32::to_bits), lo.map(f32::to_bits)));
             }
         }
     }
-    Ok(())
+    positions.sort_unstable();
+    positions.dedup();
+    let twice = positions.windows(2).find(|pair| pair[0].0 == pair[1].0);
+    ensure(twice.is_none(), || format!("{:x?} is one point with two positions", twice.map(|pair| pair[0].0)))
 }

@@ -19,10 +19,17 @@ use glam::IVec3;
 pub const EXTENT_EVEN: f64 = 1.01 * 2.639_1;
 /// Reach of an odd diamond's descendants from its centre.
 pub const EXTENT_ODD: f64 = 1.01 * 1.931_9;
-/// Longest edge of an even level's small triangles, in sample steps: one steep diagonal, √6.
-pub const EDGE_EVEN: f64 = 2.449_5;
-/// Longest edge of an odd level's small triangles: two steps along an axis, 2√2.
-pub const EDGE_ODD: f64 = 2.828_5;
+/// Longest edge of one steep diagonal of a sample cell: √6 steps.
+pub const DIAGONAL: f64 = 2.449_5;
+
+/// Longest edges of the small triangles of odd and even levels, in sample steps.
+///
+/// Odd: two steps along an axis, 2√2. Even: one steep diagonal, or two where a patch is a single
+/// triangle, since its page also holds the middle of its hypotenuse.
+pub fn edges(patch_depth: u8) -> [f64; 2] {
+    [2.828_5, if patch_depth == 0 { 2.0 * DIAGONAL } else { DIAGONAL }]
+}
+
 /// Least distance of the octahedron's surface from its centre: R/√3.
 pub const NORM_MIN: f64 = RADIUS as f64 / 1.732_050_807_568_877_3;
 

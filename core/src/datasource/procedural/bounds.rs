@@ -12,6 +12,8 @@ pub(super) struct Term {
     pub wavelength_m: f64,
     pub fixed_m: f64,
     pub rugged_m: f64,
+    /// Largest residual per amplitude and squared (edge/wavelength): [`SMOOTH`] to [`SHARP`].
+    pub curvature: f64,
 }
 
 /// Everything known beforehand about one planet's surface.
@@ -21,10 +23,22 @@ pub(super) struct Bounds {
     pub terms: Vec<Term>,
 }
 
-/// Residual of an octave per amplitude: at most `RESIDUAL_CAP`, and `CURVATURE` (edge/wavelength)².
+// Calibrated, not proven: simplex noise alone allows smaller numbers, but warps, masks and slopes
+// multiply it. At two million random triangles of every size from a third of the radius to 0.4 m,
+// on planets of five seeds, both styles and radii of 1 km, Moon and Earth, half of them on rugged
+// ground, the residual never passed 0.66 of its bound and the variation never 0.80. The bound is
+// typically 2 to 5 times the largest value seen in a class of edge and ruggedness.
+
+/// Curvature of plain noise.
+pub(super) const SMOOTH: f64 = 5.0;
+/// Curvature of stripes whose direction turns with the slope.
+pub(super) const TURNING: f64 = 15.0;
+/// Curvature of noise folded into crests.
+pub(super) const SHARP: f64 = 40.0;
+/// Residual of an octave per amplitude, at most: far apart, and per edge/wavelength at a crest.
 const RESIDUAL_CAP: f64 = 1.2;
-const CURVATURE: f64 = 5.0;
-/// Difference of an octave per amplitude: at most 2, and `SLOPE` distance/wavelength.
+const CREST: f64 = 2.4;
+/// Difference of an octave per amplitude, at most: far apart, and per distance/wavelength.
 const VARIATION_CAP: f64 = 2.0;
 const SLOPE: f64 = 4.0;
 
@@ -32,7 +46,7 @@ impl Bounds {
     pub(super) fn residual_m(&self, edge_m: f64, ruggedness_max: f64) -> f64 {
         self.sum(ruggedness_max, |term| {
             let edges = edge_m / term.wavelength_m;
-            (CURVATURE * edges * edges).min(RESIDUAL_CAP)
+            (term.curvature * edges * edges).min(CREST * edges).min(RESIDUAL_CAP)
         })
     }
 

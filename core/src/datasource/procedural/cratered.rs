@@ -7,9 +7,9 @@
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, Term};
+use super::bounds::{Bounds, SMOOTH, Term};
 use super::craters::{Craters, Dent};
-use super::noise::{Lattice, mix, ramp};
+use super::noise::{Lattice, PEAK, mix, ramp};
 use super::{Layers, ProceduralSettings, Sample, byte};
 
 /// The cratered planet.
@@ -21,6 +21,8 @@ pub(super) struct Cratered {
     swell: [Lattice; 2],
     maria: [Lattice; 2],
     octaves: Vec<Octave>,
+    /// Deepest and highest that all craters together may go.
+    craters_m: [f64; 2],
 }
 
 /// One wavelength of ground, and the craters of that size where it is long enough for any.
@@ -43,7 +45,7 @@ const SWELL_KM: f64 = 1500.0;
 const MARE_KM: f64 = 300.0;
 const CRATER: f64 = 0.33;
 const CRATER_DEPTH: f64 = 0.4;
-const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.05;
+const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.08;
 const SWELL_M: f64 = 1800.0;
 const MARE_DEPTH_M: f64 = 1900.0;
 
@@ -63,6 +65,10 @@ impl Cratered {
             octaves.push(octave(wavelength_m, settings.relief, [next(), next()]));
             wavelength_m *= 0.4;
         }
+        // Never reached in practice: it only keeps the stated range of heights honest and tight.
+        let depths_m = octaves.iter().filter_map(|o| o.craters.as_ref()).map(Craters::deepest_m);
+        let depths_m = settings.relief * depths_m.sum::<f64>();
+        let craters_m = [-0.6 * depths_m, 0.3 * depths_m];
         let lattice = |wavelength_m: f64, seed| Lattice::new(wavelength_m * size, seed);
         let body = Cratered {
             radius_m: settings.radius_m,
@@ -71,6 +77,7 @@ impl Cratered {
             swell: [lattice(3.6e6, next()), lattice(1.5e6, next())],
             maria: [lattice(2.2e6, next()), lattice(5.0e5, next())],
             octaves,
+            craters_m,
         };
         let bounds = body.bounds(size);
         (body, bounds)
@@ -83,6 +90,7 @@ impl Cratered {
         let mare = ramp(0.24, 0.36, pool);
         let ruggedness = 1.0 - (1.0 - MARE) * mare;
         let mut height_m = self.vertical * (SWELL_M * swell - MARE_DEPTH_M * mare);
+        let mut dents_m = 0.0;
         let mut fresh = 0.0;
         let mut shore = 0.0;
         for (i, octave) in self.octaves.iter().enumerate() {
@@ -92,9 +100,10 @@ impl Cratered {
             let Some(craters) = &octave.craters else { continue };
             let Dent { height_m: dent_m, fresh: bright } = craters.at(at_m, n, value);
             let left = octave.in_maria + (1.0 - octave.in_maria) * (1.0 - mare);
-            height_m += self.relief * left * dent_m;
+            dents_m += self.relief * left * dent_m;
             fresh += bright * left;
         }
+        height_m += dents_m.clamp(self.craters_m[0], self.craters_m[1]);
         let dark = ramp(0.28, 0.32, pool + shore);
         let layers = Layers {
             roughness: byte(ruggedness),
@@ -106,26 +115,30 @@ impl Cratered {
     }
 
     fn bounds(&self, size: f64) -> Bounds {
-        let octave = |wavelength_m, fixed_m, rugged_m| Term { wavelength_m, fixed_m, rugged_m };
+        let octave = |wavelength_m, fixed_m, rugged_m| Term {
+            wavelength_m,
+            fixed_m,
+            rugged_m,
+            curvature: SMOOTH,
+        };
         let km = 1000.0 * size;
         let mut terms = vec![
             octave(SWELL_KM * km, SWELL_M * self.vertical, 0.0),
             octave(MARE_KM * km, MARE_DEPTH_M * self.vertical, 0.0),
         ];
-        let (mut high_m, mut low_m) = (SWELL_M * self.vertical, 0.0);
-        low_m -= (SWELL_M + MARE_DEPTH_M) * self.vertical;
+        let swell_m = PEAK * SWELL_M * self.vertical;
+        let mut low_m = self.craters_m[0] - swell_m - MARE_DEPTH_M * self.vertical;
+        let mut high_m = self.craters_m[1] + swell_m;
         for o in &self.octaves {
             terms.push(octave(o.wavelength_m, 0.0, o.amplitude_m));
-            high_m += o.amplitude_m;
-            low_m -= o.amplitude_m;
+            high_m += PEAK * o.amplitude_m;
+            low_m -= PEAK * o.amplitude_m;
             let Some(craters) = &o.craters else { continue };
             let depth_m = self.relief * craters.deepest_m();
             // Ruggedness falls to MARE where the craters' share falls to `in_maria`.
             let rugged_m = depth_m * (1.0 - o.in_maria) / (1.0 - MARE);
             let [fixed_m, rugged_m] = [depth_m - rugged_m, rugged_m].map(|m| m * CRATER_DEPTH);
             terms.push(octave(CRATER * o.wavelength_m, fixed_m, rugged_m));
-            high_m += depth_m * Craters::RIM_SHARE;
-            low_m -= depth_m * Craters::PIT_SHARE;
         }
         Bounds {
             height_range_m: [low_m, high_m],
@@ -141,7 +154,7 @@ fn octave(wavelength_m: f64, relief: f64, seeds: [u64; 2]) -> Octave {
     Octave {
         ground: Lattice::new(wavelength_m, seeds[0]),
         wavelength_m,
-        amplitude_m: relief * wavelength_m * (0.022 - 0.016 * large),
+        amplitude_m: relief * wavelength_m * (0.022 - 0.017 * large),
         craters: cratered.then(|| Craters::new(wavelength_m, seeds[1])),
         in_maria: 0.8 - 0.72 * large,
     }

@@ -51,7 +51,7 @@ impl Craters {
             per_m: 1.0 / cell_m,
             seed,
             density: 0.55 - 0.25 * complex,
-            depth: 0.34 - 0.24 * complex - 0.07 * ramp(5.0e4, 5.0e5, cell_m),
+            depth: 0.34 - 0.24 * complex - 0.08 * ramp(5.0e4, 3.0e5, cell_m),
             peak: 0.5 * ramp(3.0e4, 8.0e4, cell_m) * (1.0 - ramp(2.0e5, 5.0e5, cell_m)),
         }
     }

@@ -7,8 +7,8 @@
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, Term};
-use super::noise::{Lattice, mix, ramp};
+use super::bounds::{Bounds, SHARP, SMOOTH, TURNING, Term};
+use super::noise::{Lattice, PEAK, mix, ramp};
 use super::outline::Outline;
 use super::{Layers, ProceduralSettings, Sample, byte};
 
@@ -58,13 +58,13 @@ const CREST: f64 = 0.06;
 const STEERING_CREST: f64 = 0.20;
 /// Ruggedness from which gullies grow.
 const UNERODED: f64 = 0.07;
-/// Calibrated wavelengths of the outline as one octave, factors on the amplitudes of ridges (their
-/// crests are sharp) and gullies (they turn with the slope), and steepest change of ruggedness.
-const OUTLINE_KM: f64 = 450.0;
+/// Calibrated like the constants of `bounds`: wavelengths of the outline as single octaves, a
+/// factor on gullies because they turn with the slope, and twice the steepest change of ruggedness
+/// seen at 200 000 pairs of points.
+const OUTLINE_KM: f64 = 400.0;
 const BELT_KM: f64 = 300.0;
-const RIDGE: f64 = 1.0;
 const GULLY: f64 = 1.8;
-const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.035;
+const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.045;
 const UPLIFT_M: f64 = 700.0;
 
 impl Earthlike {
@@ -170,17 +170,26 @@ impl Earthlike {
     }
 
     fn bounds(&self, size: f64) -> Bounds {
-        let octave = |wavelength_m, fixed_m, rugged_m| Term { wavelength_m, fixed_m, rugged_m };
+        let smooth = |wavelength_m, fixed_m, rugged_m| Term {
+            wavelength_m,
+            fixed_m,
+            rugged_m,
+            curvature: SMOOTH,
+        };
         let km = 1000.0 * size;
         let mut terms = vec![
-            octave(OUTLINE_KM * km, 5300.0 * self.vertical, 0.0),
-            octave(BELT_KM * km, 0.0, UPLIFT_M * self.vertical),
+            smooth(OUTLINE_KM * km, 5300.0 * self.vertical, 0.0),
+            smooth(BELT_KM * km, 0.0, UPLIFT_M * self.vertical),
         ];
-        let ridges = self.ridges.iter();
-        terms.extend(ridges.map(|o| octave(o.wavelength_m, o.coast_m, RIDGE * o.ridge_m)));
-        let gullies = self.gullies.iter();
-        terms.extend(gullies.map(|o| octave(o.wavelength_m, 0.0, GULLY * o.amplitude_m)));
-        terms.extend(self.details.iter().map(|o| octave(o.wavelength_m, o.fixed_m, o.rugged_m)));
+        for o in &self.ridges {
+            let term = smooth(o.wavelength_m, o.coast_m, o.ridge_m);
+            terms.push(Term { curvature: SHARP, ..term });
+        }
+        for o in &self.gullies {
+            let term = smooth(o.wavelength_m, 0.0, GULLY * o.amplitude_m);
+            terms.push(Term { curvature: TURNING, ..term });
+        }
+        terms.extend(self.details.iter().map(|o| smooth(o.wavelength_m, o.fixed_m, o.rugged_m)));
         Bounds {
             height_range_m: self.height_range_m(),
             ruggedness_slope_per_m: RUGGEDNESS_SLOPE_PER_KM / km,
@@ -191,13 +200,13 @@ impl Earthlike {
     /// Every octave at its extreme at once. A ridge octave below its mean flattens those after it
     /// to 0.45 of themselves, hence the share of the valleys.
     fn height_range_m(&self) -> [f64; 2] {
-        let coasts_m: f64 = self.ridges.iter().map(|o| o.coast_m).sum();
-        let crests_m: f64 = self.ridges.iter().map(|o| o.coast_m.max(o.ridge_m)).sum();
+        let coasts_m: f64 = self.ridges.iter().map(|o| PEAK * o.coast_m).sum();
+        let crests_m: f64 = self.ridges.iter().map(|o| o.ridge_m.max(o.coast_m)).sum();
         let first_m = self.ridges[0].ridge_m;
         let valleys_m = first_m + 0.45 * (crests_m - first_m);
         let gullies_m: f64 = self.gullies.iter().map(|o| o.amplitude_m).sum();
         let details_m =
-            |r: f64| self.details.iter().map(|o| o.fixed_m + o.rugged_m * r).sum::<f64>();
+            |r: f64| self.details.iter().map(|o| PEAK * (o.fixed_m + o.rugged_m * r)).sum::<f64>();
         let [abyss_m, shore_m, inland_m] = Outline::RANGE_M.map(|m| m * self.vertical);
         let sea_m = abyss_m - coasts_m - 0.2 * gullies_m - details_m(0.2);
         let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0);
@@ -251,7 +260,7 @@ fn detail_octaves(
         let long = wavelength_m / (wavelength_m + 2000.0);
         let short = 0.3 / (wavelength_m + 0.3);
         // Plains roll gently; at arm's length even they have stones and tufts.
-        let plain = 0.0018 + 0.010 * (1.0 - ramp(1.0, 12.0, wavelength_m));
+        let plain = 0.0018 + 0.016 * (1.0 - ramp(1.0, 12.0, wavelength_m));
         let per_m = 0.035 * (1.0 - 0.75 * long) * (1.0 - 0.5 * short);
         octaves.push(Detail {
             lattice: Lattice::new(wavelength_m, next()),

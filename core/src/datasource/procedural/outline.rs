@@ -32,8 +32,8 @@ pub(super) struct Outline {
     spread: f64,
 }
 
-/// Share of the planet under water.
-const SEA_SHARE: f64 = 0.655;
+/// Share of the planet under water, in thousandths.
+const SEA_PER_MILLE: usize = 655;
 
 impl Outline {
     /// Lowest base height anywhere and where there are mountains, and the highest; metres on a
@@ -67,9 +67,9 @@ impl Outline {
         };
         let mut values: Vec<f64> = (0..4096u64).map(|i| outline.probe(radius_m, i)).collect();
         values.sort_by(f64::total_cmp);
-        let rank = |share: f64| values[((share * 4096.0) as u16 & 0xFFF) as usize];
-        outline.spread = rank(0.95) - rank(0.05);
-        outline.coast = rank(SEA_SHARE);
+        let rank = |per_mille: usize| values[per_mille * values.len() / 1000];
+        outline.spread = rank(950) - rank(50);
+        outline.coast = rank(SEA_PER_MILLE);
         outline
     }
 

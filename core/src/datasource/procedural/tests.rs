@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::noise::{Lattice, mix, unit};
+use super::noise::{Lattice, PEAK, mix, unit};
 use super::{Planet, ProceduralSettings, Sample, Style};
 
 const EARTH_M: f64 = 6_371_000.0;
@@ -65,10 +65,11 @@ fn a_thousand_samples_have_the_same_bits_as_ever() {
 }
 
 /// A change here moves every mountain: mint it only together with the reason in the commit.
-const GOLDEN: [u64; 4] = [0, 0, 0, 0];
+const GOLDEN: [u64; 4] =
+    [0x440164C53AA18644, 0x852A86F1560DE979, 0xD14B61DFF99BBE9D, 0xF368AA3BE4AFB216];
 
 #[test]
-fn noise_stays_within_one_and_has_no_bias() {
+fn noise_stays_within_its_peak_and_has_no_bias() {
     let mut dice = Dice(3);
     let lattice = Lattice::new(1.0, 9);
     let (mut sum, mut most) = (0.0, 0.0_f64);
@@ -77,7 +78,7 @@ fn noise_stays_within_one_and_has_no_bias() {
         sum += value;
         most = most.max(value.abs());
     }
-    assert!((0.8..=1.0).contains(&most), "{most}");
+    assert!((0.67..=PEAK).contains(&most), "{most}");
     assert!((sum / 100_000.0).abs() < 0.01, "{sum}");
 }
 

@@ -1,0 +1,359 @@
+//! `overfly replay`: the loop from a flight or recording through the frames to tables and files.
+//!
+//! In:    a flight or recording, a scene, the options.
+//! Out:   a table, stills, a recording, JSON; an exit code.
+//! Keeps: nothing.
+//! Not here: the frame (`overfly`), formats (`overfly::replay`).
+
+use super::columns::Columns;
+use super::source::{Source, recording_header};
+use super::stills::{Stills, chosen};
+use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, report, write_whole};
+use indicatif::{ProgressBar, ProgressStyle};
+use overfly::core::datasource::PageKey;
+use overfly::core::frame::{FrameInput, FrameOutput};
+use overfly::core::settings::SceneSettings;
+use overfly::jobs::now_ns;
+use overfly::loader::{Arrival, Loader};
+use overfly::render_vk::{Renderer, RendererSettings};
+use overfly::replay::{Ending, Header, RecordedFrame, RunDigest, Writer};
+use overfly::{Overfly, config};
+use std::ops::Range;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What `replay` takes.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A bundled flight (rainier, descent, poles) or an .ovf file.
+    flight: String,
+    /// A scene file or a preset (earth, moon, small). A recording brings its own.
+    #[arg(long)]
+    scene: Option<String>,
+    /// Worker threads beside the main one, 0 to 64. The results are the same for any number.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(0..=64))]
+    workers: Option<u8>,
+    /// Only these frames, the end excluded. A flight starts cold at A; a recording runs from its
+    /// beginning and reports these.
+    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    frames: Option<Range<usize>>,
+    /// Size of the pictures; with a flight the level of detail follows it. [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// Draws nothing: no Vulkan is needed.
+    #[arg(long, conflicts_with = "stills")]
+    no_render: bool,
+    /// Draws only N frames, evenly spread, and writes them as PNG with a contact sheet. Without
+    /// this every frame is drawn and none is written.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    stills: Option<u16>,
+    /// Records views, page arrivals and digests of every frame.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Pages arrive when they are ready, this much later, as live; without it they arrive in the
+    /// next frame, which waits for them, so that every run is the same.
+    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u64).range(0..=60_000))]
+    loader_delay_ms: Option<u64>,
+    /// Folder for stills. [default: out/FLIGHT]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Writes counts and stage times of every frame, as columns.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+fn parse_frames(text: &str) -> Result<Range<usize>, String> {
+    let wrong = || format!("`{text}` is not A..B with whole numbers and A below B");
+    let (a, b) = text.split_once("..").ok_or_else(wrong)?;
+    let range = a.parse().map_err(|_| wrong())?..b.parse().map_err(|_| wrong())?;
+    if range.is_empty() { Err(wrong()) } else { Ok(range) }
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let wrong = || format!("`{text}` is not WxH with whole numbers from 1 to 8192");
+    let (w, h) = text.split_once('x').ok_or_else(wrong)?;
+    let side = |text: &str| match text.parse() {
+        Ok(side @ 1..=8192) => Ok(side),
+        _ => Err(wrong()),
+    };
+    Ok([side(w)?, side(h)?])
+}
+
+/// What one run works with, beside the terrain.
+struct Run {
+    scene: SceneSettings,
+    source: Source,
+    /// Frames that run; those before `reported.start` only lead there.
+    ran: Range<usize>,
+    reported: Range<usize>,
+    size_px: [u32; 2],
+    arrival: Arrival,
+    stills: Vec<usize>,
+    draws: bool,
+    loader: Loader,
+    recorder: Option<Writer>,
+    columns: Columns,
+    digest: RunDigest,
+    diverged: Option<(usize, &'static str)>,
+    pictures: Stills,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let header = recording_header(&arguments.flight)?;
+    let (scene_name, scene) = scene_of(arguments, header.as_ref())?;
+    let workers = arguments.workers.map_or_else(default_workers, usize::from);
+    let mut overfly = Overfly::new(&scene, workers)?;
+    let mut run = prepare(arguments, scene, &mut overfly)?;
+    println!(
+        "{} over {scene_name}, frames {}..{} at {} Hz, {workers} workers",
+        run.source.name(),
+        run.reported.start,
+        run.reported.end,
+        run.source.rate_hz(),
+    );
+    if let Source::Flight(flight, _) = &run.source
+        && flight.raised_m > 0.0
+    {
+        println!("raised by {:.0} m to stay clear of this scene's ground", flight.raised_m);
+    }
+    let finished = fly(&mut run, &mut overfly)?;
+    if let Some(recorder) = run.recorder.take() {
+        recorder.finish()?;
+        let path = arguments.record.as_ref().expect("there was a recorder");
+        println!("recorded {} frames: {}", run.ran.len().min(run.columns.frames()), path.display());
+    }
+    print!("{}", report::table(&run.columns));
+    println!("digest {:016x} of {} frames", run.digest.value(), run.digest.frames());
+    if let Some(path) = &arguments.json {
+        let facts = json::Facts {
+            flight: run.source.name(),
+            scene: &scene_name,
+            settings_digest: run.scene.digest(),
+            workers,
+            first_frame: run.reported.start,
+            digest: run.digest.value(),
+            diverged: run.diverged,
+        };
+        write_whole(path, json::text(&facts, &run.columns).as_bytes())?;
+        println!("wrote {}", path.display());
+    }
+    for file in run.pictures.finish()? {
+        println!("wrote {}", file.display());
+    }
+    Ok(verdict(&run.source, run.diverged, finished))
+}
+
+fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: bool) -> ExitCode {
+    match source.ending() {
+        Ending::Complete => {}
+        Ending::Unfinished => {
+            println!("the file has no end mark: its writer was stopped after its last frame");
+        }
+        Ending::Damaged(error) => eprintln!("overfly: {error}; the frames before it were played"),
+    }
+    if let Some((frame, stage)) = diverged {
+        eprintln!("overfly: diverged from the recording in frame {frame}, stage {stage}");
+        return ExitCode::from(DIVERGED);
+    }
+    if matches!(source.ending(), Ending::Damaged(_)) {
+        return ExitCode::from(BAD_INPUT);
+    }
+    if !finished {
+        eprintln!("overfly: interrupted; everything up to here was kept");
+        return ExitCode::from(INTERRUPTED);
+    }
+    if matches!(source, Source::Recording(_)) {
+        println!("same as recorded");
+    }
+    ExitCode::SUCCESS
+}
+
+/// The scene to use, and how it is called: what was asked for, else the recording's own, else Earth.
+fn scene_of(
+    arguments: &Arguments,
+    header: Option<&Header>,
+) -> Result<(String, SceneSettings), Failure> {
+    match (&arguments.scene, header) {
+        (Some(name), _) => Ok((name.clone(), config::load(name)?)),
+        (None, Some(header)) if !header.scene_text.is_empty() => {
+            let name = format!("the scene in {}", arguments.flight);
+            let scene = config::read(&header.scene_text, &name)?;
+            Ok((name, scene))
+        }
+        (None, _) => Ok(("earth".into(), config::load("earth")?)),
+    }
+}
+
+fn default_workers() -> usize {
+    std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1).min(64)
+}
+
+fn prepare(
+    arguments: &Arguments,
+    scene: SceneSettings,
+    overfly: &mut Overfly,
+) -> Result<Run, Failure> {
+    let source = Source::open(&arguments.flight, &scene, |name| overfly.flight(name))?;
+    let count = source.frames();
+    let reported = arguments.frames.clone().unwrap_or(0..count);
+    if reported.end > count || count == 0 {
+        let name = &arguments.flight;
+        let asked = format!("{}..{}", reported.start, reported.end);
+        return Err(format!("--frames {asked}: {name} has {count} frames, 0..{count}").into());
+    }
+    let is_recording = matches!(source, Source::Recording(_));
+    if is_recording && (arguments.size.is_some() || arguments.loader_delay_ms.is_some()) {
+        return Err("--size and --loader-delay-ms do not go with a recording: it holds both".into());
+    }
+    let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
+    let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px)?;
+    let stills = arguments.stills.map_or(0, usize::from);
+    let arrival = match arguments.loader_delay_ms {
+        Some(delay_ms) => Arrival::After { delay_ms },
+        None => Arrival::NextFrame,
+    };
+    let folder = PathBuf::from("out").join(source.name());
+    let recorder = arguments.record.as_ref().map(|path| {
+        let mut header = Header::recording(source.name(), source.rate_hz(), &scene);
+        header.scene_text = scene_text(arguments, &source);
+        Writer::create(path, &header)
+    });
+    Ok(Run {
+        ran: if is_recording { 0..reported.end } else { reported.clone() },
+        stills: chosen(reported.start, reported.len(), stills),
+        draws,
+        size_px,
+        arrival,
+        loader: overfly.loader(default_workers().max(1))?,
+        recorder: recorder.transpose()?,
+        columns: Columns::new(reported.len()),
+        digest: RunDigest::default(),
+        diverged: None,
+        pictures: Stills::new(arguments.out.clone().unwrap_or(folder), source.name()),
+        reported,
+        source,
+        scene,
+    })
+}
+
+/// The scene as text, so that a recording is whole in itself.
+fn scene_text(arguments: &Arguments, source: &Source) -> String {
+    match (&arguments.scene, source) {
+        (None, Source::Recording(recording)) => recording.header.scene_text.clone(),
+        (name, _) => {
+            let name = name.as_deref().unwrap_or("earth");
+            let preset = config::preset(name).map(str::to_owned);
+            preset.unwrap_or_else(|| std::fs::read_to_string(name).unwrap_or_default())
+        }
+    }
+}
+
+/// Gives the terrain a renderer; says so and goes on where there is no Vulkan.
+fn add_renderer(
+    overfly: &mut Overfly,
+    scene: &SceneSettings,
+    size_px: [u32; 2],
+) -> Result<bool, Failure> {
+    let settings = RendererSettings {
+        patch_depth: scene.lod.patch_depth,
+        patches_max: overfly.terrain().limits().leaves,
+        size_px,
+        ranges_max: u32::try_from(scene.depth.splits_m.len() + 1)?,
+        frames_in_flight: 2,
+        validation: std::env::var_os("OVERFLY_VALIDATION").is_some(),
+    };
+    match Renderer::new(&settings) {
+        Ok(renderer) => {
+            println!("drawing on {}", renderer.device_line());
+            overfly.set_renderer(renderer);
+            Ok(true)
+        }
+        Err(error) => {
+            println!("not drawing: {error}");
+            Ok(false)
+        }
+    }
+}
+
+/// All frames. False if Ctrl-C ended them early.
+fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+    let style = "{bar:40} {pos}/{len} frames, {per_sec}, {eta} left";
+    let bar = ProgressBar::new(run.ran.len() as u64)
+        .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
+    let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    for index in run.ran.clone() {
+        if stop.load(Ordering::Relaxed) {
+            bar.abandon();
+            return Ok(false);
+        }
+        frame(run, overfly, index, (&mut input, &mut output))?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(true)
+}
+
+/// One frame: pages in, stages, what comes out.
+fn frame(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    index: usize,
+    (input, output): (&mut FrameInput, &mut FrameOutput),
+) -> Result<(), Failure> {
+    let begin_ns = now_ns();
+    run.source.fill(index, &run.scene, run.size_px, input);
+    match (run.source.arrived(index), run.arrival) {
+        (Some(keys), _) => run.loader.fetch(keys, &mut input.arrived),
+        (None, Arrival::NextFrame) => run.loader.fetch(&output.wanted, &mut input.arrived),
+        (None, Arrival::After { delay_ms }) => {
+            run.loader.request(&output.wanted, delay_ms);
+            run.loader.collect(&mut input.arrived);
+        }
+    }
+    let arrived: Vec<PageKey> = input.arrived.iter().map(|page| page.key).collect();
+    let record = RecordedFrame {
+        time_s: input.time_s,
+        views: if run.recorder.is_some() { input.views.clone() } else { Vec::new() },
+        arrived,
+        digest: Default::default(),
+    };
+    let still = run.stills.contains(&index);
+    let drawn = run.draws && (still || run.stills.is_empty()) && run.reported.contains(&index);
+    let ready_ns = now_ns();
+    if drawn {
+        overfly.frame_drawn(input, output, 0)?;
+    } else {
+        overfly.frame(input, output)?;
+    }
+    let end_ns = now_ns();
+    if still && drawn {
+        take_still(run, overfly, index)?;
+    }
+    if let Some(recorder) = &mut run.recorder {
+        recorder.frame(&RecordedFrame { digest: output.digest, ..record })?;
+    }
+    if run.diverged.is_none()
+        && let Some(stage) = run.source.difference(index, &output.digest)
+    {
+        run.diverged = Some((index, stage));
+    }
+    if run.reported.contains(&index) {
+        run.digest.add(&output.digest);
+        run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
+    }
+    Ok(())
+}
+
+fn take_still(run: &mut Run, overfly: &mut Overfly, index: usize) -> Result<(), Failure> {
+    let pixels = overfly.with_renderer(|renderer| renderer.read_pixels());
+    if let Some(pixels) = pixels.transpose()? {
+        run.pictures.add(index, "", run.size_px, pixels)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,150 @@
+//! What a replay plays: a flight, whose frames are computed, or a recording, whose frames are held
+//! against what was recorded.
+//!
+//! In:    a bundled flight's name or an `.ovf` file.
+//! Out:   [`Source`], frame by frame.
+//! Keeps: all poses or recorded frames in memory.
+//! Not here: the file format (`overfly::replay`).
+
+use super::Failure;
+use overfly::core::datasource::PageKey;
+use overfly::core::digest::FrameDigest;
+use overfly::core::frame::FrameInput;
+use overfly::core::settings::SceneSettings;
+use overfly::replay::{self, BUNDLED, Ending, Flight, Header, Kind, Reader, Recording, view_of};
+use std::path::Path;
+
+/// What is played.
+pub enum Source {
+    /// Poses; pages arrive as the loader has them.
+    Flight(Flight, Ending),
+    /// Views, arrivals and digests.
+    Recording(Recording),
+}
+
+/// Whether `name` is a file with recorded frames; its header then.
+pub fn recording_header(name: &str) -> Result<Option<Header>, Failure> {
+    if BUNDLED.contains(&name) {
+        return Ok(None);
+    }
+    let path = Path::new(name);
+    if !path.exists() {
+        let bundled = BUNDLED.join(", ");
+        return Err(format!("`{name}` is neither a file nor a bundled flight ({bundled})").into());
+    }
+    let reader = Reader::open(path)?;
+    Ok((reader.header().kind == Kind::Recording).then(|| reader.header().clone()))
+}
+
+impl Source {
+    /// Opens a flight or a recording.
+    pub fn open(
+        name: &str,
+        scene: &SceneSettings,
+        bundled: impl Fn(&str) -> Option<Flight>,
+    ) -> Result<Self, Failure> {
+        if let Some(flight) = bundled(name) {
+            return Ok(Self::Flight(flight, Ending::Complete));
+        }
+        match recording_header(name)? {
+            None => {
+                let (flight, ending) = Flight::read(Path::new(name))?;
+                Ok(Self::Flight(flight, ending))
+            }
+            Some(header) => {
+                let differences = header.differs_from(scene);
+                if !differences.is_empty() {
+                    let list: Vec<_> = differences.iter().map(|d| format!("\n  {d}")).collect();
+                    return Err(format!(
+                        "{name} was recorded with another scene, so it cannot be replayed:{}",
+                        list.concat()
+                    )
+                    .into());
+                }
+                Ok(Self::Recording(Recording::open(Path::new(name))?))
+            }
+        }
+    }
+
+    /// Shown in tables and file names.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Flight(flight, _) => &flight.name,
+            Self::Recording(recording) => &recording.header.name,
+        }
+    }
+
+    /// Frames a second.
+    pub fn rate_hz(&self) -> f64 {
+        match self {
+            Self::Flight(flight, _) => flight.rate_hz,
+            Self::Recording(recording) => recording.header.rate_hz,
+        }
+    }
+
+    /// Frames that can be played.
+    pub fn frames(&self) -> usize {
+        match self {
+            Self::Flight(flight, _) => flight.poses.len(),
+            Self::Recording(recording) => recording.frames.len(),
+        }
+    }
+
+    /// How the file ends.
+    pub fn ending(&self) -> &Ending {
+        match self {
+            Self::Flight(_, ending) => ending,
+            Self::Recording(recording) => &recording.ending,
+        }
+    }
+
+    /// Size of the recorded pictures; flights have none.
+    pub fn size_px(&self) -> Option<[u32; 2]> {
+        match self {
+            Self::Flight(..) => None,
+            Self::Recording(recording) => Some(recording.frames.first()?.views.first()?.size_px),
+        }
+    }
+
+    /// Fills views and time of frame `index`; a flight's views are the scene's.
+    pub fn fill(
+        &self,
+        index: usize,
+        scene: &SceneSettings,
+        size_px: [u32; 2],
+        input: &mut FrameInput,
+    ) {
+        input.views.clear();
+        match self {
+            Self::Flight(flight, _) => {
+                let pose = &flight.poses[index];
+                input.time_s = pose.time_s;
+                let lenses = scene.views.iter();
+                input.views.extend(lenses.map(|lens| view_of(pose, lens, size_px, &scene.body)));
+            }
+            Self::Recording(recording) => {
+                let frame = &recording.frames[index];
+                input.time_s = frame.time_s;
+                input.views.extend_from_slice(&frame.views);
+            }
+        }
+    }
+
+    /// The pages that arrived in frame `index`, if that was recorded.
+    pub fn arrived(&self, index: usize) -> Option<&[PageKey]> {
+        match self {
+            Self::Flight(..) => None,
+            Self::Recording(recording) => Some(&recording.frames[index].arrived),
+        }
+    }
+
+    /// The stage in which frame `index` differs from the recording, if it does.
+    pub fn difference(&self, index: usize, now: &FrameDigest) -> Option<&'static str> {
+        match self {
+            Self::Flight(..) => None,
+            Self::Recording(recording) => {
+                replay::first_difference(&recording.frames[index].digest, now)
+            }
+        }
+    }
+}

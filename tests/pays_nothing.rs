@@ -1,0 +1,69 @@
+//! A frame allocates nothing in the steady state.
+//!
+//! In:    the `small` and `earth` scenes, a counting allocator.
+//! Out:   passes or fails.
+//! Keeps: a count of allocations.
+//! Not here: the same for bare graphs (`jobs/tests`).
+
+use overfly::core::frame::{FrameInput, FrameOutput};
+use overfly::{Overfly, config, replay};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is passed on to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Flies a stretch and returns (frames with page arrivals, splits, allocations inside frames).
+fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
+    let scene = config::load("earth").unwrap();
+    let mut overfly = Overfly::new(&scene, workers).unwrap();
+    let mut loader = overfly.loader(1).unwrap();
+    let flight = overfly.flight("rainier").unwrap();
+    let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    let (mut with_pages, mut splits, mut allocations) = (0, 0, 0);
+    for (index, pose) in flight.poses[..warm_up + frames].iter().enumerate() {
+        input.views.clear();
+        input.views.push(replay::view_of(pose, &scene.views[0], [1280, 720], &scene.body));
+        loader.fetch(&output.wanted, &mut input.arrived);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        overfly.frame(&mut input, &mut output).unwrap();
+        if index >= warm_up {
+            allocations += ALLOCATIONS.load(Ordering::Relaxed) - before;
+            with_pages += u32::from(output.counts.admitted > 0);
+            splits += output.counts.splits;
+        }
+    }
+    (with_pages, splits, allocations)
+}
+
+#[test]
+fn a_frame_allocates_nothing_in_the_steady_state() {
+    for workers in [0, 1] {
+        let (with_pages, splits, allocations) = fly(workers, 600, 900);
+        println!("{workers} workers: {with_pages} frames with pages, {splits} splits");
+        assert!(splits > 0, "nothing happened in these frames");
+        assert_eq!(allocations, 0, "{workers} workers");
+    }
+}
