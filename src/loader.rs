@@ -13,19 +13,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-/// When wanted pages arrive.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Arrival {
-    /// In the next frame, which waits for them: the same frames on every machine.
-    NextFrame,
-    /// When they are ready, but not before this many milliseconds: as live, and so only the same
-    /// once recorded.
-    After {
-        /// Delay in milliseconds, on top of the time that making a page takes.
-        delay_ms: u64,
-    },
-}
-
 /// The threads, and what is in flight.
 pub struct Loader {
     jobs: Option<Sender<PageKey>>,

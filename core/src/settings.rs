@@ -26,7 +26,7 @@ pub struct SceneSettings {
     pub depth: DepthSettings,
     /// Memory limits.
     pub memory: MemorySettings,
-    /// Colours the ground below height 0 as water.
+    /// Water covers the ground below height 0.
     pub sea: bool,
     /// The sun; without one the ground is lit evenly.
     pub sun: Option<SunSettings>,
@@ -137,6 +137,7 @@ impl SceneSettings {
         for (i, view) in self.views.iter().enumerate() {
             list.push((format!("views[{i}]"), format!("{view:?}")));
         }
+        list.push(("sea".into(), self.sea.to_string()));
         list.push(("depth.splits_m".into(), format!("{:?}", self.depth.splits_m)));
         list.push(("memory.pages_bytes".into(), self.memory.pages_bytes.to_string()));
         list

@@ -10,8 +10,8 @@ const TUNDRA: vec3<f32> = vec3<f32>(0.150, 0.137, 0.095);
 const ROCK: vec3<f32> = vec3<f32>(0.172, 0.166, 0.142);
 const DARK_ROCK: vec3<f32> = vec3<f32>(0.095, 0.090, 0.086);
 const SNOW: vec3<f32> = vec3<f32>(0.60, 0.63, 0.67);
-const REGOLITH_DARK: vec3<f32> = vec3<f32>(0.085, 0.082, 0.078);
-const REGOLITH_BRIGHT: vec3<f32> = vec3<f32>(0.235, 0.225, 0.210);
+const REGOLITH_DARK: vec3<f32> = vec3<f32>(0.060, 0.058, 0.055);
+const REGOLITH_BRIGHT: vec3<f32> = vec3<f32>(0.170, 0.163, 0.152);
 
 // ---- Where they lie: pairs are (none of it, all of it) ----
 const BEACH_M: vec2<f32> = vec2<f32>(9.0, 2.0);       // height
@@ -105,7 +105,9 @@ fn land_albedo(layers: vec4<f32>, height_m: f32, slope: f32) -> vec3<f32> {
 }
 
 fn regolith_albedo(layers: vec4<f32>) -> vec3<f32> {
-    let bright = clamp(0.25 + 0.55 * layers.y + 0.30 * (layers.x - 0.5), 0.0, 1.0);
+    // Rock is young and bright; where there is water elsewhere, there are dark maria here.
+    let fresh = 0.60 * layers.y + 0.20 * (layers.x - 0.5);
+    let bright = clamp(0.35 + fresh - 0.35 * layers.z, 0.0, 1.0);
     return mix(REGOLITH_DARK, REGOLITH_BRIGHT, bright);
 }
 

@@ -86,7 +86,6 @@ fn different_pixels(a: &[u8], b: &[u8]) -> usize {
     a.chunks_exact(4).zip(b.chunks_exact(4)).filter(|(a, b)| a != b).count()
 }
 
-/// The ground under the camera is culled if the winding or the sign of an axis is wrong.
 #[test]
 fn the_planet_is_a_round_disc_without_holes_in_black_space() {
     let Some(mut renderer) = renderer(false) else { return };
@@ -113,15 +112,15 @@ fn the_planet_is_a_round_disc_without_holes_in_black_space() {
     assert!(inside > 10_000, "only {inside} pixels of ground");
 }
 
-/// North is up and east is right: red at +z would be elsewhere if an axis were flipped.
 #[test]
-fn the_picture_is_not_mirrored() {
+fn the_picture_is_not_mirrored_and_shows_the_near_side() {
     let Some(mut renderer) = renderer(false) else { return };
     let mut patches = planet::patches(4, 0.0);
     let paint = |v: &mut overfly_core::mesh::PatchVertex| {
-        let [_, y, z] = v.position.hi;
-        let bright = y > 0.0 && z > 0.0;
-        // Seen from +x the north-east quarter is bright.
+        let [x, y, z] = v.position.hi;
+        // Seen from +x the north-east quarter is bright; the far side is not, so that it shows if
+        // the wrong faces are culled.
+        let bright = x > 0.0 && y > 0.0 && z > 0.0;
         v.layers = if bright { [255, 255, 0, 0] } else { [0, 0, 0, 0] };
     };
     patches.vertices.iter_mut().for_each(paint);

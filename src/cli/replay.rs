@@ -14,15 +14,19 @@ use overfly::core::datasource::PageKey;
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
 use overfly::jobs::now_ns;
-use overfly::loader::{Arrival, Loader};
+use overfly::loader::Loader;
 use overfly::render_vk::{Renderer, RendererSettings};
 use overfly::replay::{Ending, Header, RecordedFrame, RunDigest, Writer};
 use overfly::{Overfly, config};
+use std::collections::VecDeque;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most frames of a flight's lead-in.
+const LEAD_IN_MAX: usize = 600;
 
 /// What `replay` takes.
 #[derive(clap::Args)]
@@ -35,7 +39,7 @@ pub struct Arguments {
     /// Worker threads beside the main one, 0 to 64. The results are the same for any number.
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=64))]
     workers: Option<u8>,
-    /// Only these frames, the end excluded. A flight starts cold at A; a recording runs from its
+    /// Only these frames, the end excluded. A flight comes up at A; a recording runs from its
     /// beginning and reports these.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<usize>>,
@@ -52,10 +56,10 @@ pub struct Arguments {
     /// Records views, page arrivals and digests of every frame.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Pages arrive when they are ready, this much later, as live; without it they arrive in the
-    /// next frame, which waits for them, so that every run is the same.
-    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u64).range(0..=60_000))]
-    loader_delay_ms: Option<u64>,
+    /// Pages arrive this many milliseconds of the flight's time after the next frame, as from a
+    /// slow disk. The frames are the same on every machine: a frame waits for a page that is due.
+    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=60_000))]
+    loader_delay_ms: Option<u32>,
     /// Folder for stills. [default: out/FLIGHT]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -89,7 +93,12 @@ struct Run {
     ran: Range<usize>,
     reported: Range<usize>,
     size_px: [u32; 2],
-    arrival: Arrival,
+    /// Frames that a page takes beyond the next.
+    delay: usize,
+    /// Pages on their way: the frame in which they arrive, counted with the lead-in.
+    coming: VecDeque<(usize, PageKey)>,
+    /// Frames run so far, lead-in included.
+    count: usize,
     stills: Vec<usize>,
     draws: bool,
     loader: Loader,
@@ -211,10 +220,8 @@ fn prepare(
     let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
     let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px)?;
     let stills = arguments.stills.map_or(0, usize::from);
-    let arrival = match arguments.loader_delay_ms {
-        Some(delay_ms) => Arrival::After { delay_ms },
-        None => Arrival::NextFrame,
-    };
+    let delay_s = f64::from(arguments.loader_delay_ms.unwrap_or(0)) / 1e3;
+    let delay = (0..).find(|&frames| f64::from(frames) >= delay_s * source.rate_hz());
     let folder = PathBuf::from("out").join(source.name());
     let recorder = arguments.record.as_ref().map(|path| {
         let mut header = Header::recording(source.name(), source.rate_hz(), &scene);
@@ -226,7 +233,9 @@ fn prepare(
         stills: chosen(reported.start, reported.len(), stills),
         draws,
         size_px,
-        arrival,
+        delay: usize::try_from(delay.unwrap_or(0_u32))?,
+        coming: VecDeque::new(),
+        count: 0,
         loader: overfly.loader(default_workers().max(1))?,
         recorder: recorder.transpose()?,
         columns: Columns::new(reported.len()),
@@ -287,44 +296,66 @@ fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
     let bar = ProgressBar::new(run.ran.len() as u64)
         .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
     let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    if !lead_in(run, overfly, &stop, (&mut input, &mut output))? {
+        return Ok(false);
+    }
     for index in run.ran.clone() {
         if stop.load(Ordering::Relaxed) {
             bar.abandon();
             return Ok(false);
         }
-        frame(run, overfly, index, (&mut input, &mut output))?;
+        frame(run, overfly, (index, true), (&mut input, &mut output))?;
         bar.inc(1);
     }
     bar.finish_and_clear();
     Ok(true)
 }
 
-/// One frame: pages in, stages, what comes out.
+/// Holds the clock until the terrain has come up: a flight's first pose until nothing changes, a
+/// recording's frames before its time moves. False if Ctrl-C ended it.
+fn lead_in(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    stop: &AtomicBool,
+    (input, output): (&mut FrameInput, &mut FrameOutput),
+) -> Result<bool, Failure> {
+    let recorded = run.source.lead_in();
+    let is_recording = matches!(run.source, Source::Recording(_));
+    for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        let begin = if is_recording { index } else { run.ran.start };
+        frame(run, overfly, (begin, false), (input, output))?;
+        let c = &output.counts;
+        let settled = c.leaves > 0 && c.splits + c.merges + c.wanted == 0 && run.coming.is_empty();
+        if !is_recording && settled {
+            break;
+        }
+    }
+    Ok(true)
+}
+
+/// One frame: pages in, stages, what comes out. Frames of the lead-in are recorded and checked,
+/// but not counted.
 fn frame(
     run: &mut Run,
     overfly: &mut Overfly,
-    index: usize,
+    (index, counted): (usize, bool),
     (input, output): (&mut FrameInput, &mut FrameOutput),
 ) -> Result<(), Failure> {
     let begin_ns = now_ns();
-    run.source.fill(index, &run.scene, run.size_px, input);
-    match (run.source.arrived(index), run.arrival) {
-        (Some(keys), _) => run.loader.fetch(keys, &mut input.arrived),
-        (None, Arrival::NextFrame) => run.loader.fetch(&output.wanted, &mut input.arrived),
-        (None, Arrival::After { delay_ms }) => {
-            run.loader.request(&output.wanted, delay_ms);
-            run.loader.collect(&mut input.arrived);
-        }
+    let played = index + if counted { run.source.lead_in() } else { 0 };
+    run.source.fill(played, &run.scene, run.size_px, input);
+    let arriving = arriving(run, played, &output.wanted);
+    run.loader.fetch(&arriving, &mut input.arrived);
+    let mut record = RecordedFrame { time_s: input.time_s, arrived: arriving, ..Default::default() };
+    if run.recorder.is_some() {
+        record.views.extend_from_slice(&input.views);
     }
-    let arrived: Vec<PageKey> = input.arrived.iter().map(|page| page.key).collect();
-    let record = RecordedFrame {
-        time_s: input.time_s,
-        views: if run.recorder.is_some() { input.views.clone() } else { Vec::new() },
-        arrived,
-        digest: Default::default(),
-    };
+    let reported = counted && run.reported.contains(&index);
     let still = run.stills.contains(&index);
-    let drawn = run.draws && (still || run.stills.is_empty()) && run.reported.contains(&index);
+    let drawn = run.draws && reported && (still || run.stills.is_empty());
     let ready_ns = now_ns();
     if drawn {
         overfly.frame_drawn(input, output, 0)?;
@@ -336,18 +367,34 @@ fn frame(
         take_still(run, overfly, index)?;
     }
     if let Some(recorder) = &mut run.recorder {
-        recorder.frame(&RecordedFrame { digest: output.digest, ..record })?;
+        record.digest = output.digest;
+        recorder.frame(&record)?;
     }
     if run.diverged.is_none()
-        && let Some(stage) = run.source.difference(index, &output.digest)
+        && let Some(stage) = run.source.difference(played, &output.digest)
     {
         run.diverged = Some((index, stage));
     }
-    if run.reported.contains(&index) {
+    if reported {
         run.digest.add(&output.digest);
         run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
     }
     Ok(())
+}
+
+/// The pages of this frame: as recorded; else what was wanted and is due.
+fn arriving(run: &mut Run, played: usize, wanted: &[PageKey]) -> Vec<PageKey> {
+    if let Some(keys) = run.source.arrived(played) {
+        return keys.to_vec();
+    }
+    for &key in wanted {
+        if run.coming.iter().all(|&(_, known)| known != key) {
+            run.coming.push_back((run.count + run.delay, key));
+        }
+    }
+    let due = run.coming.iter().take_while(|&&(due, _)| due <= run.count).count();
+    run.count += 1;
+    run.coming.drain(..due).map(|(_, key)| key).collect()
 }
 
 fn take_still(run: &mut Run, overfly: &mut Overfly, index: usize) -> Result<(), Failure> {

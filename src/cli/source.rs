@@ -11,7 +11,9 @@ use overfly::core::datasource::PageKey;
 use overfly::core::digest::FrameDigest;
 use overfly::core::frame::FrameInput;
 use overfly::core::settings::SceneSettings;
-use overfly::replay::{self, BUNDLED, Ending, Flight, Header, Kind, Reader, Recording, view_of};
+use overfly::replay::{
+    self, BUNDLED, Ending, Flight, Header, Kind, Reader, RecordedFrame, Recording, view_of,
+};
 use std::path::Path;
 
 /// What is played.
@@ -82,12 +84,20 @@ impl Source {
         }
     }
 
-    /// Frames that can be played.
+    /// Frames that can be played; those of a recording's lead-in are not counted.
     pub fn frames(&self) -> usize {
         match self {
             Self::Flight(flight, _) => flight.poses.len(),
-            Self::Recording(recording) => recording.frames.len(),
+            Self::Recording(recording) => recording.frames.len() - self.lead_in(),
         }
+    }
+
+    /// Frames of a recording before time begins to move: there the terrain came up.
+    pub fn lead_in(&self) -> usize {
+        let Self::Recording(recording) = self else { return 0 };
+        let Some(first) = recording.frames.first() else { return 0 };
+        let still = |frame: &&RecordedFrame| frame.time_s == first.time_s;
+        recording.frames.iter().take_while(still).count() - 1
     }
 
     /// How the file ends.

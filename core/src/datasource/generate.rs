@@ -20,6 +20,7 @@ pub struct Generator {
     planet: Planet,
     body: Ellipsoid,
     patch_depth: u8,
+    sea: bool,
 }
 
 impl Generator {
@@ -30,6 +31,7 @@ impl Generator {
             planet: Planet::new(&source.procedural(&settings.body)),
             body: settings.body,
             patch_depth: settings.lod.patch_depth,
+            sea: settings.sea,
         }
     }
 
@@ -90,17 +92,22 @@ impl Generator {
         let metres = |lattice: f64| lattice / norm * curvature_max;
         let slope = self.planet.ruggedness_slope_per_m();
         let ruggedness = (sample.ruggedness + slope * metres(reach)).min(1.0);
+        let variation_m = self.planet.variation_m(metres(reach), ruggedness);
+        let drowned = self.sea && sample.height_m + variation_m < 0.0;
+        let shore = self.sea && !drowned && sample.height_m - variation_m < 0.0;
         let error = |edge: f64| {
             let edge_m = metres(edge * step);
             let sagitta_m = edge_m * edge_m / (8.0 * curvature_min);
-            narrow(self.planet.residual_m(edge_m, ruggedness) + sagitta_m)
+            let ground_m = if drowned { 0.0 } else { self.planet.residual_m(edge_m, ruggedness) };
+            // Where water meets land, an edge cuts the corner between them.
+            let corner_m = if shore { self.planet.variation_m(edge_m, ruggedness) / 2.0 } else { 0.0 };
+            narrow(ground_m + corner_m + sagitta_m)
         };
         let [odd, even] = edges(self.patch_depth);
-        let extent_m = metres(EXTENT_EVEN * leaf_side);
         Bound {
             error_odd_m: error(odd),
             error_even_m: error(even),
-            variation_m: narrow(self.planet.variation_m(extent_m, ruggedness)),
+            variation_m: narrow(variation_m),
         }
     }
 

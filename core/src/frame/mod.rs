@@ -73,7 +73,7 @@ impl Terrain {
         let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
         let ranges = settings.depth.splits_m.len() + 1;
         Self {
-            horizon: Horizon::new(&settings.body, generator.planet().height_range_m()),
+            horizon: Horizon::new(&settings.body, generator.planet().height_range_m(), settings.sea),
             input: Mutex::default(),
             eyes: RwLock::default(),
             pages: RwLock::new(Pages::new(limits.pages)),
@@ -250,8 +250,8 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     let mut output = terrain.output.lock();
     output.built.clear();
     patches.drain_fresh(&mut output.built);
-    let ground =
-        Ground { diamonds: &lod.diamonds, pages: &pages, body: &terrain.settings.body };
+    let SceneSettings { body, sea, .. } = &terrain.settings;
+    let ground = Ground { diamonds: &lod.diamonds, pages: &pages, body, sea: *sea };
     let slots = &output.built;
     let used = &mut blocks[..slots.len().div_ceil(BLOCK)];
     team.for_each_chunk(used, 1, |first, chunk| {

@@ -245,8 +245,9 @@ impl Surface<'_> {
             let page = self.pages.get(page);
             let bound = page.bound_at(centre);
             let height_m = f64::from(page.heights_m[page.sample_index(centre)]);
-            low_m = height_m - f64::from(bound.variation_m);
-            high_m = height_m + f64::from(bound.variation_m);
+            // Below a sea the interval shrinks to its surface, where the body's floor is.
+            low_m = (height_m - f64::from(bound.variation_m)).max(floor_m);
+            high_m = (height_m + f64::from(bound.variation_m)).max(floor_m);
             let is_even = level.is_multiple_of(2);
             error_m = f64::from(if is_even { bound.error_even_m } else { bound.error_odd_m });
         }

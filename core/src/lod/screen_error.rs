@@ -41,16 +41,18 @@ pub struct Region {
 pub struct Horizon {
     /// Least and greatest radius of curvature of the ellipsoid, metres.
     pub curvature_m: [f64; 2],
-    /// The deepest ground of the whole body, metres.
+    /// The deepest surface of the whole body, metres.
     pub floor_m: f64,
     /// The highest ground of the whole body, metres.
     pub peak_m: f64,
 }
 
 impl Horizon {
-    /// Of a body whose ground lies within `height_range_m`.
-    pub fn new(body: &Ellipsoid, height_range_m: [f64; 2]) -> Self {
-        let [floor_m, peak_m] = height_range_m;
+    /// Of a body whose ground lies within `height_range_m`; a sea hides what is below height 0.
+    pub fn new(body: &Ellipsoid, height_range_m: [f64; 2], sea: bool) -> Self {
+        let [low_m, high_m] = height_range_m;
+        let surface_m = |height_m: f64| if sea && height_m < 0.0 { 0.0 } else { height_m };
+        let (floor_m, peak_m) = (surface_m(low_m), surface_m(high_m));
         Self { curvature_m: body.curvature_radii_m(), floor_m, peak_m }
     }
 

@@ -43,6 +43,8 @@ pub struct Ground<'a> {
     pub pages: &'a Pages,
     /// The body's shape.
     pub body: &'a Ellipsoid,
+    /// Whether ground below height 0 is covered by water, whose surface is drawn instead.
+    pub sea: bool,
 }
 
 /// Builds the patches of one block: `slots` are at most [`BLOCK`] live slots.
@@ -98,7 +100,8 @@ fn build_patch(
 
 fn position(ground: &Ground<'_>, page: &Page, point: IVec3) -> DVec3 {
     let normal = normal_of(point);
-    let height_m = f64::from(page.heights_m[page.sample_index(point)]);
+    let ground_m = f64::from(page.heights_m[page.sample_index(point)]);
+    let height_m = if ground.sea && ground_m < 0.0 { 0.0 } else { ground_m };
     ground.body.surface_from_normal(normal) + normal * height_m
 }
 

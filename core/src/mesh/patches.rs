@@ -18,7 +18,8 @@ pub struct PatchVertex {
     pub normal_oct: [i16; 2],
     /// Hidden layers: roughness, rock, moisture, temperature; 0 to 255.
     pub layers: [u8; 4],
-    /// Height above the ellipsoid in metres.
+    /// Height of the ground above the ellipsoid in metres; below 0 under a sea, although the
+    /// position is on the water.
     pub height_m: f32,
     /// Morph target and other later uses; zero.
     pub reserved: f32,

@@ -11,7 +11,7 @@ use glam::DVec3;
 use overfly_core::geodesy::trig::{cos, sin};
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 
-/// Places looked at, evenly spread between 60° south and 60° north.
+/// Places looked at, evenly spread around the middle of the search.
 const PLACES: u32 = 2000;
 /// Points on each ring about a place, and sides from which it can be approached.
 const SIDES: u32 = 12;
@@ -19,6 +19,10 @@ const SIDES: u32 = 12;
 const ROLL_POINTS: u32 = 16;
 /// Metres of relief that a metre of roughness of the roll outweighs.
 const ROUGH: f64 = 300.0;
+/// Latitude and longitude of the middle of the search: where the presets' sun stands high.
+const MIDDLE_DEG: [f64; 2] = [30.0, -100.0];
+/// The search covers normals within this of the middle's, as 1 − cosine: some 37° around it.
+const CAP: f64 = 0.2;
 /// The golden angle, in radians.
 const GOLDEN: f64 = 2.399_963_229_728_653;
 
@@ -72,10 +76,11 @@ pub(super) fn choose(body: &Ellipsoid, ground_height_m: &dyn Fn(Geodetic) -> f64
 }
 
 fn place(i: u32) -> DVec3 {
-    let z = 0.866 * (1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(PLACES));
-    let across = (1.0 - z * z).sqrt();
-    let lon_rad = GOLDEN * f64::from(i);
-    DVec3::new(across * cos(lon_rad), across * sin(lon_rad), z)
+    let axes = Geodetic::from_degrees(MIDDLE_DEG[0], MIDDLE_DEG[1], 0.0).enu_axes();
+    let up = 1.0 - CAP * (2.0 * f64::from(i) + 1.0) / (2.0 * f64::from(PLACES));
+    let across = (1.0 - up * up).sqrt();
+    let turn_rad = GOLDEN * f64::from(i);
+    axes * DVec3::new(across * cos(turn_rad), across * sin(turn_rad), up)
 }
 
 fn azimuth(side: u32) -> f64 {
