@@ -14,7 +14,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use std::{env, fs, path::PathBuf};
 
 const PROGRAMS: [(&str, &[&str]); 3] = [
-    ("terrain", &["air", "two_float", "terrain"]),
+    ("terrain", &["air", "two_float", "grain", "terrain"]),
     ("sky", &["air", "sky"]),
     ("self_test", &["two_float", "self_test"]),
 ];

@@ -5,25 +5,6 @@
 //! Out:   draws, finished pictures, counts and a digest of each frame.
 //! Keeps: [`Overfly`]: terrain, workers, graph, renderer.
 //! Not here: the stages (`overfly_core`), Vulkan (`overfly_render_vk`), files (`overfly_replay`).
-//!
-//! ```
-//! use overfly::core::frame::{FrameInput, FrameOutput};
-//! use overfly::{Overfly, config, replay};
-//!
-//! let scene = config::load("small")?;
-//! let mut terrain = Overfly::new(&scene, 1)?;
-//! let mut loader = terrain.loader(1)?;
-//! let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
-//! let flight = terrain.flight("poles").expect("a bundled flight");
-//! for pose in &flight.poses[..20] {
-//!     input.views.clear();
-//!     input.views.push(replay::view_of(pose, &scene.views[0], [640, 360], &scene.body));
-//!     loader.fetch(&output.wanted, &mut input.arrived);
-//!     terrain.frame(&mut input, &mut output)?;
-//! }
-//! assert!(output.counts.leaves > 8);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 #![forbid(unsafe_code)]
 
 pub use overfly_config as config;
@@ -33,6 +14,11 @@ pub use overfly_render_vk as render_vk;
 pub use overfly_replay as replay;
 
 pub mod loader;
+
+/// The README's program is compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 use crate::core::camera::ViewFault;
 use crate::core::datasource::generate::Generator;

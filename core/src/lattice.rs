@@ -24,7 +24,7 @@ pub type Quadrant = u8;
 ///
 /// Injective for points with even coordinates (all vertices above [`LEVEL_END`]).
 pub fn key_of(point: IVec3) -> u64 {
-    let half = |c: i32| u64::from((i64::from(c / 2) + (1 << 29)).unsigned_abs());
+    let half = |c: i32| (i64::from(c / 2) + (1 << 29)).unsigned_abs();
     (half(point.x) << 32) | (half(point.y) << 1) | u64::from(point.z < 0)
 }
 

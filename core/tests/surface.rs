@@ -1,4 +1,9 @@
 //! The surface as a whole: closed, consistent, converging, the same whatever the history.
+//!
+//! In:    poses, random flights with pages withheld.
+//! Out:   passes or fails.
+//! Keeps: nothing.
+//! Not here: the bundled flights (the root package's contracts).
 
 mod rig;
 

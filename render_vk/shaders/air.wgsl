@@ -1,6 +1,6 @@
 // What every pass knows: the view, the light, the air, and every constant of the shading.
 
-// ---- The view: one block of push constants, 120 bytes; `ViewTerms` in src/matrices.rs. ----
+// ---- The view: one block of push constants, 124 bytes; `ViewTerms` in src/matrices.rs. ----
 struct View {
     eye_hi: vec3<f32>,        // body-fixed eye, metres, as a two-float
     air: f32,                 // 1 with an atmosphere, else 0
@@ -18,6 +18,7 @@ struct View {
     sun_on: f32,              // 1 with a sun; 0: lit evenly from above the eye
     depth_slope: f32,         // clip z = slope * w + offset, reversed: 1 near, 0 far
     depth_offset: f32,
+    pixel_rad: f32,           // angle of a pixel in the middle of the picture
 }
 
 var<immediate> view: View;
@@ -28,11 +29,12 @@ const SUN_COS: f32 = 0.99998919;                          // cosine of the disc'
 const SUN_DISC: f32 = 60.0;                               // radiance of the disc over SUN_LIGHT
 const SKY_LIGHT: vec3<f32> = vec3<f32>(0.040, 0.058, 0.088); // sky on flat ground, per SUN_LIGHT
 const NIGHT_LIGHT: vec3<f32> = vec3<f32>(0.012, 0.016, 0.026); // never quite dark
+const MOON_LIGHT: vec3<f32> = vec3<f32>(0.26, 0.31, 0.42);   // irradiance of a full moon, raised
 const EXPOSURE: f32 = 0.37;
 
 // ---- Air: one exponential profile of molecules and haze together ----
 const RAYLEIGH: vec3<f32> = vec3<f32>(4.3e-6, 9.8e-6, 22.0e-6); // per metre at height 0, clear
-const HAZE: vec3<f32> = vec3<f32>(3.2e-6, 3.2e-6, 3.2e-6);  // 1/e in the green: 77 km
+const HAZE: vec3<f32> = vec3<f32>(2.0e-6, 2.0e-6, 2.0e-6);  // 1/e in the green: 85 km
 const HAZE_G: f32 = 0.72;                                // how much haze scatters forward
 const SCALE_HEIGHT_M: f32 = 8000.0;
 const AIR_TOP_M: f32 = 64000.0;                          // e⁻⁸ of the ground's density

@@ -10,9 +10,9 @@ use overfly_core::camera::Camera;
 use overfly_core::geodesy::narrow;
 use overfly_core::scene::FrameParts;
 
-/// The shaders' `View`: 120 bytes as thirty floats, below the 128 that every device takes.
+/// The shaders' `View`: 124 bytes as thirty-one floats, below the 128 that every device takes.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct ViewTerms(pub(crate) [f32; 30]);
+pub(crate) struct ViewTerms(pub(crate) [f32; 31]);
 
 impl ViewTerms {
     /// All terms but the depth range's.
@@ -33,11 +33,12 @@ impl ViewTerms {
             (narrowed(camera.normal), narrow(camera.height_m)),
             (narrowed(sun), flag(parts.sun_direction.is_some())),
         ];
-        let mut terms = [0.0; 30];
+        let mut terms = [0.0; 31];
         for (row, (vector, last)) in terms.chunks_exact_mut(4).zip(rows) {
             row[..3].copy_from_slice(&vector);
             row[3] = last;
         }
+        terms[30] = narrow(1.0 / camera.pixels_per_radian);
         Self(terms)
     }
 
@@ -98,7 +99,8 @@ mod tests {
     fn a_range_changes_depth_terms_only() {
         let (a, b) = (terms().in_range(0.1, 100.0), terms().in_range(99.0, f64::INFINITY));
         assert_eq!(a.0[..28], b.0[..28]);
-        assert_ne!(a.0[28..], b.0[28..]);
+        assert_ne!(a.0[28..30], b.0[28..30]);
+        assert_eq!(a.0[30], b.0[30]);
     }
 
     #[test]

@@ -49,6 +49,9 @@ pub struct Arguments {
     /// Draws nothing: no Vulkan is needed.
     #[arg(long, conflicts_with = "stills")]
     no_render: bool,
+    /// Draws with Vulkan's validation layer; any message makes the exit code 1.
+    #[arg(long, conflicts_with = "no_render")]
+    validate: bool,
     /// Draws only N frames, evenly spread, and writes them as PNG with a contact sheet. Without
     /// this every frame is drawn and none is written.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
@@ -152,7 +155,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for file in run.pictures.finish()? {
         println!("wrote {}", file.display());
     }
-    Ok(verdict(&run.source, run.diverged, finished))
+    let messages = overfly.with_renderer(|renderer| renderer.validation_messages());
+    let messages = messages.unwrap_or_default();
+    messages.iter().for_each(|message| eprintln!("overfly: validation: {message}"));
+    if arguments.validate {
+        println!("validation messages: {}", messages.len());
+    }
+    let code = verdict(&run.source, run.diverged, finished);
+    Ok(if messages.is_empty() { code } else { ExitCode::from(DIVERGED) })
 }
 
 fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: bool) -> ExitCode {
@@ -218,7 +228,7 @@ fn prepare(
         return Err("--size and --loader-delay-ms do not go with a recording: it holds both".into());
     }
     let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
-    let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px)?;
+    let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px, arguments.validate)?;
     let stills = arguments.stills.map_or(0, usize::from);
     let delay_s = f64::from(arguments.loader_delay_ms.unwrap_or(0)) / 1e3;
     let delay = (0..).find(|&frames| f64::from(frames) >= delay_s * source.rate_hz());
@@ -265,6 +275,7 @@ fn add_renderer(
     overfly: &mut Overfly,
     scene: &SceneSettings,
     size_px: [u32; 2],
+    validation: bool,
 ) -> Result<bool, Failure> {
     let settings = RendererSettings {
         patch_depth: scene.lod.patch_depth,
@@ -272,7 +283,7 @@ fn add_renderer(
         size_px,
         ranges_max: u32::try_from(scene.depth.splits_m.len() + 1)?,
         frames_in_flight: 2,
-        validation: std::env::var_os("OVERFLY_VALIDATION").is_some(),
+        validation,
     };
     match Renderer::new(&settings) {
         Ok(renderer) => {

@@ -58,25 +58,18 @@ impl Generator {
     }
 
     fn fill_samples(&self, page: &mut Page) {
-        for j in 0..PAGE_SIDE {
-            for i in 0..PAGE_SIDE {
-                let point = page.key.sample(i, j);
-                let sample = self.planet.sample(normal_of(point));
-                let height_m = narrow(sample.height_m);
-                let at = j * PAGE_SIDE + i;
-                page.heights_m[at] = height_m;
-                let layers = sample.layers;
-                page.layers[at] =
-                    [layers.roughness, layers.rock, layers.moisture, layers.temperature];
-                let [low, high] = page.height_range_m;
-                page.height_range_m = [
-                    if height_m < low { height_m } else { low },
-                    if height_m > high { height_m } else { high },
-                ];
-                if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
-                    page.bounds[j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE] =
-                        self.bound(page.key, point, &sample);
-                }
+        for (i, j) in places() {
+            let point = page.key.sample(i, j);
+            let sample = self.planet.sample(normal_of(point));
+            let at = j * PAGE_SIDE + i;
+            page.heights_m[at] = narrow(sample.height_m);
+            let layers = sample.layers;
+            page.layers[at] = [layers.roughness, layers.rock, layers.moisture, layers.temperature];
+            let [low, high] = page.height_range_m;
+            page.height_range_m = [low.min(page.heights_m[at]), high.max(page.heights_m[at])];
+            if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
+                let bound = self.bound(page.key, point, &sample);
+                page.bounds[j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE] = bound;
             }
         }
     }
@@ -113,16 +106,13 @@ impl Generator {
 
     /// Normals by central differences over the lattice cross, whichever page its arms lie in.
     fn fill_normals(&self, page: &mut Page) {
-        for j in 0..PAGE_SIDE {
-            for i in 0..PAGE_SIDE {
-                let point = page.key.sample(i, j);
-                let arms = cross_of(point, page.key.step());
-                let [a, b, c, d] = arms.map(|arm| self.position(page, arm));
-                let up = normal_of(point);
-                let normal = (a - c).cross(b - d).normalize();
-                let outward = if normal.dot(up) < 0.0 { -normal } else { normal };
-                page.normals[j * PAGE_SIDE + i] = encode(outward);
-            }
+        for (i, j) in places() {
+            let point = page.key.sample(i, j);
+            let arms = cross_of(point, page.key.step());
+            let [a, b, c, d] = arms.map(|arm| self.position(page, arm));
+            let normal = (a - c).cross(b - d).normalize();
+            let inward = normal.dot(normal_of(point)) < 0.0;
+            page.normals[j * PAGE_SIDE + i] = encode(if inward { -normal } else { normal });
         }
     }
 
@@ -132,6 +122,11 @@ impl Generator {
             .unwrap_or_else(|| narrow(self.planet.sample(normal).height_m));
         self.body.surface_from_normal(normal) + normal * f64::from(height_m)
     }
+}
+
+/// Column and row of every sample, row by row.
+fn places() -> impl Iterator<Item = (usize, usize)> {
+    (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (i, j)))
 }
 
 /// The height at a lattice point if it is a sample of this page.

@@ -55,25 +55,21 @@ impl PageKey {
     }
 
     /// Depth in the quadtree; roots are 0.
-    #[expect(clippy::cast_possible_truncation, reason = "six bits")]
     pub fn depth(self) -> u8 {
         (self.0 >> 58) as u8
     }
 
     /// Which base quadrant.
-    #[expect(clippy::cast_possible_truncation, reason = "two bits")]
     pub fn quadrant(self) -> Quadrant {
         (self.0 >> 56 & 3) as u8
     }
 
     /// Column, along u.
-    #[expect(clippy::cast_possible_truncation, reason = "28 bits")]
     pub fn x(self) -> u32 {
         (self.0 >> 28 & 0xFFF_FFFF) as u32
     }
 
     /// Row, along v.
-    #[expect(clippy::cast_possible_truncation, reason = "28 bits")]
     pub fn y(self) -> u32 {
         (self.0 & 0xFFF_FFFF) as u32
     }

@@ -143,16 +143,18 @@ mod tests {
 
     #[test]
     fn round_trip_is_exact_to_nanometres_from_the_core_to_orbit() {
-        for body in [Ellipsoid::WGS84, Ellipsoid::MOON, Ellipsoid::MARS] {
-            for lat in -90..=90 {
-                for lon in (-180..=180).step_by(15) {
-                    for height_m in [-11_000.0, 0.0, 8848.0, 400_000.0, 3_000_000.0] {
-                        let at = Geodetic::from_degrees(f64::from(lat), f64::from(lon), height_m);
-                        let point = body.ecef_from_geodetic(at).0;
-                        let error = round_trip_error_m(&body, point);
-                        assert!(error < 8e-9, "{error} m at {lat} {lon} {height_m}");
-                    }
-                }
+        let bodies = [Ellipsoid::WGS84, Ellipsoid::MOON, Ellipsoid::MARS];
+        let heights_m = [-11_000.0, 0.0, 8848.0, 400_000.0, 3_000_000.0];
+        let mut cases = Vec::new();
+        for lat in -90..=90 {
+            let lons = (-180..=180).step_by(15);
+            cases.extend(lons.map(|lon| (f64::from(lat), f64::from(lon))));
+        }
+        for (lat, lon) in cases {
+            for (body, height_m) in bodies.iter().flat_map(|b| heights_m.map(|h| (b, h))) {
+                let at = Geodetic::from_degrees(lat, lon, height_m);
+                let error = round_trip_error_m(body, body.ecef_from_geodetic(at).0);
+                assert!(error < 8e-9, "{error} m at {lat} {lon} {height_m}");
             }
         }
     }

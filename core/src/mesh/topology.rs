@@ -51,7 +51,7 @@ mod tests {
             let mut used = list;
             used.sort_unstable();
             used.dedup();
-            assert_eq!(used.len() as u32, (n + 1) * (n + 2) / 2);
+            assert_eq!(used.len(), ((n + 1) * (n + 2) / 2) as usize);
         }
     }
 }

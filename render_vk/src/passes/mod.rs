@@ -21,7 +21,7 @@ pub(crate) const VIEW_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_
 );
 
 /// Size of the shaders' `View`.
-const VIEW_BYTES: u32 = 120;
+const VIEW_BYTES: u32 = 124;
 const _: () = assert!(size_of::<crate::matrices::ViewTerms>() == VIEW_BYTES as usize);
 
 /// All pipelines. They share one layout: the view as push constants, no descriptors.

@@ -6,14 +6,48 @@
 //! Keeps: the terms and the height range of one planet.
 //! Not here: the octaves themselves (`earthlike`, `cratered`).
 
-/// What one octave adds: `fixed_m + rugged_m * ruggedness` is its largest amplitude.
+/// What one octave adds: `fixed_m`, and `rugged_m` times its growth, is its largest amplitude.
 #[derive(Clone, Copy)]
 pub(super) struct Term {
     pub wavelength_m: f64,
     pub fixed_m: f64,
     pub rugged_m: f64,
+    /// How the second part follows ruggedness.
+    pub growth: Growth,
     /// Largest residual per amplitude and squared (edge/wavelength): [`SMOOTH`] to [`SHARP`].
     pub curvature: f64,
+}
+
+/// How an amplitude grows with ruggedness.
+#[derive(Clone, Copy)]
+pub(super) enum Growth {
+    /// In step with it.
+    Even,
+    /// Fast on gentle ground, as [`early`] says.
+    Early,
+    /// Only from [`MOUNTAINOUS`] on.
+    Mountain,
+    /// Only from [`UNERODED`] on.
+    Eroded,
+}
+
+/// No ground is less rugged, and no mountain begins below.
+pub(super) const MOUNTAINOUS: f64 = 0.03;
+/// Ruggedness from which gullies grow.
+pub(super) const UNERODED: f64 = 0.07;
+
+impl Growth {
+    /// In the order of the variants.
+    fn all(ruggedness: f64) -> [f64; 4] {
+        let mountain = (ruggedness - MOUNTAINOUS).max(0.0) / (1.0 - MOUNTAINOUS);
+        [ruggedness, early(ruggedness), mountain, (ruggedness - UNERODED).max(0.0)]
+    }
+}
+
+/// Three times a small ruggedness, level at 1.
+pub(super) fn early(ruggedness: f64) -> f64 {
+    let smooth = 1.0 - ruggedness;
+    1.0 - smooth * smooth * smooth
 }
 
 /// Everything known beforehand about one planet's surface.
@@ -55,7 +89,7 @@ impl Bounds {
     }
 
     fn sum(&self, ruggedness_max: f64, share: impl Fn(&Term) -> f64) -> f64 {
-        let ruggedness = ruggedness_max.clamp(0.0, 1.0);
-        self.terms.iter().map(|t| (t.fixed_m + t.rugged_m * ruggedness) * share(t)).sum()
+        let growth = Growth::all(ruggedness_max.clamp(0.0, 1.0));
+        self.terms.iter().map(|t| (t.fixed_m + t.rugged_m * growth[t.growth as usize]) * share(t)).sum()
     }
 }

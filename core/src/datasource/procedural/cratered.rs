@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, SMOOTH, Term};
+use super::bounds::{Bounds, Growth, SMOOTH, Term};
 use super::craters::{Craters, Dent};
 use super::noise::{Lattice, PEAK, mix, ramp};
 use super::{Layers, ProceduralSettings, Sample, byte};
@@ -119,6 +119,7 @@ impl Cratered {
             wavelength_m,
             fixed_m,
             rugged_m,
+            growth: Growth::Even,
             curvature: SMOOTH,
         };
         let km = 1000.0 * size;

@@ -7,9 +7,9 @@
 
 use glam::DVec3;
 
-use super::bounds::{Bounds, SHARP, SMOOTH, TURNING, Term};
-use super::noise::{Lattice, PEAK, mix, ramp};
-use super::outline::Outline;
+use super::bounds::{Bounds, Growth, SHARP, SMOOTH, TURNING, Term, UNERODED, early};
+use super::noise::{Lattice, PEAK, mix, ramp, round};
+use super::outline::{Outline, Shape};
 use super::{Layers, ProceduralSettings, Sample, byte};
 
 /// The Earth-like planet.
@@ -23,6 +23,11 @@ pub(super) struct Earthlike {
     details: Vec<Detail>,
     moisture: [Lattice; 2],
     weather: Lattice,
+    /// How many details are longer than [`LONG_M`].
+    long_details: usize,
+    /// Inverses of [`FADE_DEPTH_M`] and [`BEACH_M`] on this planet.
+    per_depth: f64,
+    per_beach: f64,
     /// Slope at which gullies run straight downhill.
     slope_scale: f64,
 }
@@ -47,6 +52,19 @@ struct Detail {
     /// Amplitude on the smoothest ground, and what full ruggedness adds.
     fixed_m: f64,
     rugged_m: f64,
+    /// Knolls stand where this octave's noise is high, so high per squared noise.
+    knoll_m: f64,
+    /// Depth of the stream beds along the zeros of the octave before; see [`PER_BED`].
+    bed_m: f64,
+}
+
+/// The ground at one point while it is being made.
+#[derive(Clone, Copy)]
+struct Ground<'a> {
+    height_m: f64,
+    /// Squared slope of what is longer than details.
+    steep: f64,
+    shape: &'a Shape,
 }
 
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
@@ -56,14 +74,27 @@ const STEEPEST: f64 = 0.10;
 const CREST: f64 = 0.06;
 /// The same for the slope that steers gullies, which must not turn within a gully's width.
 const STEERING_CREST: f64 = 0.20;
-/// Ruggedness from which gullies grow.
-const UNERODED: f64 = 0.07;
+/// Details longer than this are the same under water and on beaches.
+const LONG_M: f64 = 400.0;
+/// Depth at which shorter details begin to fade, to be gone at twice of it.
+const FADE_DEPTH_M: f64 = 50.0;
+/// Height from which ground is no beach, on a planet of the Earth's size.
+const BEACH_M: f64 = 12.0;
+/// Noise at the foot of a knoll.
+const KNOLL_FOOT: f64 = 0.05;
+/// Inverse of the noise at the upper edge of a stream's bank, which is where the noise of one
+/// octave and this share of the next pass it.
+const PER_BED: f64 = 8.0;
+const MEANDER: f64 = 0.15;
 /// Calibrated like the constants of `bounds`: wavelengths of the outline as single octaves, a
 /// factor on gullies because they turn with the slope, and twice the steepest change of ruggedness
 /// seen at 200 000 pairs of points.
 const OUTLINE_KM: f64 = 400.0;
 const BELT_KM: f64 = 300.0;
 const GULLY: f64 = 1.8;
+/// Knolls as amplitude of their octave, beds as an octave of so much of the wavelength.
+const KNOLL: f64 = 0.5;
+const BED: f64 = 0.4;
 const RUGGEDNESS_SLOPE_PER_KM: f64 = 0.045;
 const UPLIFT_M: f64 = 700.0;
 
@@ -85,6 +116,7 @@ impl Earthlike {
         let gully_start = ridges[ridges.len() - 1].wavelength_m * 0.8;
         let gullies = gully_octaves(gully_start, 250.0 * half, settings.relief, &mut next);
         let details = detail_octaves(gully_start, settings, &mut next);
+        let long_details = details.iter().take_while(|o| o.wavelength_m > LONG_M).count();
         let body = Earthlike {
             radius_m: settings.radius_m,
             vertical,
@@ -94,6 +126,9 @@ impl Earthlike {
             details,
             moisture: [Lattice::new(3.0e6 * size, next()), Lattice::new(5.0e5 * finer, next())],
             weather: Lattice::new(2.5e6 * size, next()),
+            long_details,
+            per_depth: 1.0 / (FADE_DEPTH_M * settings.relief.max(1e-3)),
+            per_beach: 1.0 / (BEACH_M * vertical.max(1e-6)),
             slope_scale: 0.10 * settings.relief.max(1e-3),
         };
         let bounds = body.bounds(size);
@@ -103,25 +138,53 @@ impl Earthlike {
     pub(super) fn sample(&self, n: DVec3) -> Sample {
         let at_m = n * self.radius_m;
         let shape = self.outline.at(at_m, n);
-        let mut height_m = self.vertical * (shape.base_m + UPLIFT_M * shape.mountain);
-        let mut slope = DVec3::ZERO;
+        let base_m = self.vertical * (shape.base_m + UPLIFT_M * shape.mountain);
+        let (ridges_m, slope) = self.ridged(at_m, &shape);
+        let slope = slope - n * n.dot(slope);
+        let (gullies_m, slope) = self.gullied(at_m, n, (slope, shape.ruggedness));
+        let steep = slope.length_squared();
+        let ground = Ground { height_m: base_m + ridges_m + gullies_m, steep, shape: &shape };
+        let (height_m, grain) = self.detailed(at_m, &ground);
+        let layers = self.layers((at_m, n), &Ground { height_m, ..ground }, grain);
+        Sample { height_m, layers, ruggedness: shape.ruggedness }
+    }
 
+    /// Height and slope of coasts and mountain ridges.
+    fn ridged(&self, at_m: DVec3, shape: &Shape) -> (f64, DVec3) {
+        let mut height_m = 0.0;
+        let mut slope = DVec3::ZERO;
+        if shape.mountain <= 0.0 {
+            // Nothing needs the slope of the deep sea floor.
+            let shallow = ramp(-3500.0, -2000.0, shape.base_m);
+            for octave in &self.ridges {
+                if shallow > 0.0 {
+                    let (value, gradient) = octave.lattice.value_and_gradient(at_m);
+                    height_m += octave.coast_m * value;
+                    slope += gradient * octave.coast_m;
+                } else {
+                    height_m += octave.coast_m * octave.lattice.value(at_m);
+                }
+            }
+            return (height_m, slope * shallow);
+        }
         let mut crest = 1.0;
         for octave in &self.ridges {
             let (value, gradient) = octave.lattice.value_and_gradient(at_m);
-            height_m += octave.coast_m * value;
-            slope += gradient * octave.coast_m;
             let rounded = (value * value + CREST * CREST).sqrt();
             let ridge = 1.0 - 2.0 * rounded;
             let amplitude_m = octave.ridge_m * shape.mountain * crest;
-            height_m += amplitude_m * ridge;
+            height_m += octave.coast_m * value + amplitude_m * ridge;
             let broad = (value * value + STEERING_CREST * STEERING_CREST).sqrt();
-            slope += gradient * (-2.0 * amplitude_m * value / broad);
+            slope += gradient * (octave.coast_m - 2.0 * amplitude_m * value / broad);
             crest = (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * crest);
         }
+        (height_m, slope)
+    }
 
-        slope -= n * n.dot(slope);
-        let eroded = shape.ruggedness - UNERODED;
+    /// Height of the gullies, and the slope with them.
+    fn gullied(&self, at_m: DVec3, n: DVec3, (slope, ruggedness): (DVec3, f64)) -> (f64, DVec3) {
+        let eroded = ruggedness - UNERODED;
+        let (mut height_m, mut slope) = (0.0, slope);
         // Plains and sea floor have no gullies, which saves a seventh of their time.
         let gullies = if eroded > 0.0 { &self.gullies[..] } else { &[] };
         for octave in gullies {
@@ -133,29 +196,61 @@ impl Earthlike {
             height_m += amplitude_m * value;
             slope += change * amplitude_m;
         }
-
-        let steep = slope.length_squared();
-        let mut local = 0.35 + 0.65 * steep / (steep + 0.06);
-        let steep = steep / (steep + 0.16);
-        for octave in &self.details {
-            let amplitude_m = octave.fixed_m + octave.rugged_m * shape.ruggedness * local;
-            let value = octave.lattice.value(at_m);
-            height_m += amplitude_m * value;
-            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
-        }
-        let layers = self.layers(at_m, n, height_m, (shape.mountain, shape.ruggedness, steep));
-        Sample { height_m, layers, ruggedness: shape.ruggedness }
+        (height_m, slope)
     }
 
-    fn layers(&self, at_m: DVec3, n: DVec3, height_m: f64, ground: (f64, f64, f64)) -> Layers {
-        let (mountain, ruggedness, steep) = ground;
+    /// The height with all fine detail, and the noise of the shortest wave that matters here.
+    fn detailed(&self, at_m: DVec3, ground: &Ground) -> (f64, f64) {
+        let ruggedness = ground.shape.ruggedness;
+        let mut height_m = ground.height_m;
+        let mut local = 0.35 + 0.65 * ground.steep / (ground.steep + 0.06);
+        let (mut swell, mut last) = (0.0, 0.0);
+        let (long, short) = self.details.split_at(self.long_details);
+        for octave in long {
+            let value = octave.lattice.fine_value(at_m);
+            height_m += (octave.fixed_m + octave.rugged_m * ruggedness * local) * value;
+            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
+            swell = 0.6 * swell + value;
+            last = value;
+        }
+        let above_m = height_m.abs();
+        let deep = if height_m < 0.0 { above_m * self.per_depth - 1.0 } else { 0.0 };
+        if deep >= 1.0 {
+            return (height_m, last);
+        }
+        let seen = 1.0 - ramp(0.0, 1.0, deep);
+        // Some plains are flat and some are hummocky; beaches and the water's edge are smooth.
+        let dry = ramp(0.1, 1.0, above_m * self.per_beach);
+        let lively = seen * (0.12 + 0.88 * dry) * (0.3 + 0.7 * ramp(-0.35, 0.4, swell));
+        let rugged = seen * early(ruggedness);
+        for octave in short {
+            let value = octave.lattice.fine_value(at_m);
+            let amplitude_m = octave.fixed_m * lively + octave.rugged_m * rugged * local;
+            let knoll = (value - KNOLL_FOOT).max(0.0);
+            let bed = (last + MEANDER * value) * PER_BED;
+            let bank = (1.0 - bed * bed).max(0.0);
+            height_m += amplitude_m * value + octave.knoll_m * lively * (knoll * knoll)
+                - octave.bed_m * (seen * dry) * (bank * bank);
+            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
+            last = value;
+        }
+        (height_m, last)
+    }
+
+    fn layers(&self, (at_m, n): (DVec3, DVec3), ground: &Ground, grain: f64) -> Layers {
+        let Shape { mountain, ruggedness, .. } = *ground.shape;
+        let height_m = ground.height_m;
+        let steep = ground.steep / (ground.steep + 0.16);
+        // Steps of moisture and temperature would draw contour lines; grain breaks them up.
+        let grain = grain * 1000.0;
+        let dither = (grain - round(grain)) / 255.0;
         let above_m = height_m.max(0.0) / self.vertical.max(1e-9);
-        let weather = self.weather.value(at_m);
+        let weather = self.weather.fine_value(at_m);
         // Sine of latitude squared: warm to 30 degrees, steep in the westerlies, cold caps.
         let north = n.z * n.z;
         let polar = north * north * north * north;
         let celsius = 30.0 - 36.0 * north - 18.0 * polar + 6.0 * weather - 0.0065 * above_m;
-        let wet = self.moisture[0].value(at_m) + 0.4 * self.moisture[1].value(at_m);
+        let wet = self.moisture[0].fine_value(at_m) + 0.4 * self.moisture[1].fine_value(at_m);
         let tropics = 1.0 - ramp(0.0, 0.12, north);
         let deserts = ramp(0.05, 0.18, north) * (1.0 - ramp(0.25, 0.45, north));
         let moist = 0.55 + 0.30 * tropics - 0.38 * deserts + 0.55 * wet + 0.15 * mountain
@@ -164,32 +259,39 @@ impl Earthlike {
         Layers {
             roughness: byte(ruggedness),
             rock: byte(rock),
-            moisture: byte(moist),
-            temperature: byte((celsius + 40.0) / 80.0),
+            moisture: byte(moist + dither),
+            temperature: byte((celsius + 40.0) / 80.0 + dither),
         }
     }
 
     fn bounds(&self, size: f64) -> Bounds {
-        let smooth = |wavelength_m, fixed_m, rugged_m| Term {
-            wavelength_m,
-            fixed_m,
-            rugged_m,
+        let km = 1000.0 * size;
+        let base = Term {
+            wavelength_m: OUTLINE_KM * km,
+            fixed_m: 5300.0 * self.vertical,
+            rugged_m: 0.0,
+            growth: Growth::Mountain,
             curvature: SMOOTH,
         };
-        let km = 1000.0 * size;
-        let mut terms = vec![
-            smooth(OUTLINE_KM * km, 5300.0 * self.vertical, 0.0),
-            smooth(BELT_KM * km, 0.0, UPLIFT_M * self.vertical),
-        ];
+        let fixed = |wavelength_m, fixed_m| Term { wavelength_m, fixed_m, ..base };
+        let grown = |wavelength_m, rugged_m| Term { wavelength_m, fixed_m: 0.0, rugged_m, ..base };
+        let mut terms = vec![base, grown(BELT_KM * km, UPLIFT_M * self.vertical)];
         for o in &self.ridges {
-            let term = smooth(o.wavelength_m, o.coast_m, o.ridge_m);
-            terms.push(Term { curvature: SHARP, ..term });
+            terms.push(fixed(o.wavelength_m, o.coast_m));
+            terms.push(Term { curvature: SHARP, ..grown(o.wavelength_m, o.ridge_m) });
         }
         for o in &self.gullies {
-            let term = smooth(o.wavelength_m, 0.0, GULLY * o.amplitude_m);
-            terms.push(Term { curvature: TURNING, ..term });
+            let term = grown(o.wavelength_m, GULLY * o.amplitude_m);
+            terms.push(Term { curvature: TURNING, growth: Growth::Eroded, ..term });
         }
-        terms.extend(self.details.iter().map(|o| smooth(o.wavelength_m, o.fixed_m, o.rugged_m)));
+        for (i, o) in self.details.iter().enumerate() {
+            let growth = if i < self.long_details { Growth::Even } else { Growth::Early };
+            let term = grown(o.wavelength_m, o.rugged_m);
+            terms.push(Term { fixed_m: o.fixed_m + KNOLL * o.knoll_m, growth, ..term });
+            if o.bed_m > 0.0 {
+                terms.push(fixed(BED * o.wavelength_m, 0.5 * o.bed_m));
+            }
+        }
         Bounds {
             height_range_m: self.height_range_m(),
             ruggedness_slope_per_m: RUGGEDNESS_SLOPE_PER_KM / km,
@@ -205,11 +307,11 @@ impl Earthlike {
         let first_m = self.ridges[0].ridge_m;
         let valleys_m = first_m + 0.45 * (crests_m - first_m);
         let gullies_m: f64 = self.gullies.iter().map(|o| o.amplitude_m).sum();
-        let details_m =
-            |r: f64| self.details.iter().map(|o| PEAK * (o.fixed_m + o.rugged_m * r)).sum::<f64>();
+        let details_m = |r: f64| self.details.iter().map(|o| o.highest_m(r)).sum::<f64>();
+        let beds_m: f64 = self.details.iter().map(|o| o.bed_m).sum();
         let [abyss_m, shore_m, inland_m] = Outline::RANGE_M.map(|m| m * self.vertical);
-        let sea_m = abyss_m - coasts_m - 0.2 * gullies_m - details_m(0.2);
-        let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0);
+        let sea_m = abyss_m - coasts_m - 0.2 * gullies_m - details_m(0.2) - beds_m;
+        let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0) - beds_m;
         let peak_m = inland_m + UPLIFT_M * self.vertical + crests_m + gullies_m + details_m(1.0);
         [sea_m.min(valley_m), peak_m]
     }
@@ -256,19 +358,36 @@ fn detail_octaves(
     let mut wavelength_m = longest_m;
     let mut octaves = Vec::new();
     while wavelength_m >= settings.finest_m {
+        octaves.push(Detail::new(wavelength_m, settings.relief, next()));
+        wavelength_m /= 2.5;
+    }
+    octaves
+}
+
+impl Detail {
+    fn new(wavelength_m: f64, relief: f64, seed: u64) -> Detail {
         // Slopes are gentlest in kilometres, where gullies rule, and in decimetres.
         let long = wavelength_m / (wavelength_m + 2000.0);
         let short = 0.3 / (wavelength_m + 0.3);
         // Plains roll gently; at arm's length even they have stones and tufts.
-        let plain = 0.0018 + 0.016 * (1.0 - ramp(1.0, 12.0, wavelength_m));
+        let hilly = 1.0 - ramp(250.0, 2500.0, wavelength_m);
+        let stony = 1.0 - ramp(1.0, 8.0, wavelength_m);
+        let plain = 0.0018 + 0.0075 * hilly + 0.009 * stony;
         let per_m = 0.035 * (1.0 - 0.75 * long) * (1.0 - 0.5 * short);
-        octaves.push(Detail {
-            lattice: Lattice::new(wavelength_m, next()),
+        let scale = relief * wavelength_m;
+        let between = |low: f64, high: f64| (low..high).contains(&wavelength_m);
+        Detail {
+            lattice: Lattice::new(wavelength_m, seed),
             wavelength_m,
-            fixed_m: plain * settings.relief * wavelength_m,
-            rugged_m: per_m * settings.relief * wavelength_m,
-        });
-        wavelength_m /= 2.5;
+            fixed_m: plain * scale,
+            rugged_m: per_m * scale,
+            knoll_m: if between(40.0, LONG_M) { 0.05 * scale } else { 0.0 },
+            bed_m: if between(60.0, LONG_M) { 0.010 * scale } else { 0.0 },
+        }
     }
-    octaves
+
+    /// The most this octave adds at a ruggedness, beds left aside.
+    fn highest_m(&self, ruggedness: f64) -> f64 {
+        PEAK * (self.fixed_m + self.rugged_m * early(ruggedness)) + PEAK * PEAK * self.knoll_m
+    }
 }

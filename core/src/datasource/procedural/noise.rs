@@ -8,6 +8,8 @@
 
 use glam::DVec3;
 
+use crate::geodesy::frames::narrow;
+
 /// 1.5 * 2^52: adding and subtracting it rounds to an integer without a call, and the sum's bits
 /// count up by one per integer, so they serve as lattice coordinates.
 pub(super) const ROUND: f64 = 6_755_399_441_055_744.0;
@@ -18,6 +20,8 @@ const PRIME_Z: u64 = 0x1656_67B1_9E37_79F9;
 /// the other three are so far away that they add less than 0.02, and midway all four give less.
 pub(super) const PEAK: f64 = 0.75;
 const SCALE: f64 = 75.5;
+const SIXTH: f64 = 1.0 / 6.0;
+const SIXTH32: f32 = 1.0 / 6.0;
 
 /// Half of the gradients; their covariance is a third of the identity, so no axis is favoured.
 const HALF_GRADIENTS: [[f64; 3]; 16] = [
@@ -40,6 +44,7 @@ const HALF_GRADIENTS: [[f64; 3]; 16] = [
 ];
 
 static GRADIENTS: [[f64; 4]; 32] = with_opposites(&HALF_GRADIENTS);
+static GRADIENTS_F32: [[f32; 4]; 32] = narrowed(&GRADIENTS);
 
 const fn with_opposites(half: &[[f64; 3]; 16]) -> [[f64; 4]; 32] {
     let mut all = [[0.0; 4]; 32];
@@ -48,6 +53,18 @@ const fn with_opposites(half: &[[f64; 3]; 16]) -> [[f64; 4]; 32] {
         let [x, y, z] = half[i];
         all[i] = [x, y, z, 0.0];
         all[i + 16] = [-x, -y, -z, 0.0];
+        i += 1;
+    }
+    all
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a table made at compile time")]
+const fn narrowed(wide: &[[f64; 4]; 32]) -> [[f32; 4]; 32] {
+    let mut all = [[0.0; 4]; 32];
+    let mut i = 0;
+    while i < 32 {
+        let [x, y, z, _] = wide[i];
+        all[i] = [x as f32, y as f32, z as f32, 0.0];
         i += 1;
     }
     all
@@ -68,6 +85,56 @@ struct Corners {
     dy: [f64; 4],
     dz: [f64; 4],
     hash: [u64; 4],
+}
+
+/// The cell around a point: offsets from its first corner, sum of that corner's coordinates and
+/// seed, and which of the cell's simplices holds the point.
+struct Cell {
+    at: [f64; 3],
+    base: u64,
+    order: usize,
+}
+
+/// One of the six simplices of a cell: what to add to a point's offset to see it from each corner,
+/// and what the corners' hashes add.
+#[derive(Clone, Copy)]
+struct Simplex {
+    offsets: [[f64; 4]; 3],
+    narrow: [[f32; 4]; 3],
+    steps: [u64; 4],
+}
+
+/// By which of x >= y, y >= z and x >= z hold, as bits 0 to 2. Two of the eight cannot happen.
+static SIMPLICES: [Simplex; 8] = simplices();
+
+const fn simplices() -> [Simplex; 8] {
+    let empty = Simplex { offsets: [[0.0; 4]; 3], narrow: [[0.0; 4]; 3], steps: [0; 4] };
+    let mut all = [empty; 8];
+    let mut order = 0;
+    while order < 8 {
+        let (xy, yz, xz) = (order & 1 != 0, order & 2 != 0, order & 4 != 0);
+        // Which coordinates are largest and which are not smallest orders the inner corners.
+        let first = [xy & xz, !xy & yz, !yz & !xz];
+        let second = [xy | xz, !xy | yz, !(yz & xz)];
+        let primes = [PRIME_X, PRIME_Y, PRIME_Z];
+        let simplex = &mut all[order];
+        let mut axis = 0;
+        while axis < 3 {
+            let (i, j) = (first[axis] as u8, second[axis] as u8);
+            let (i32, j32) = (i as f32, j as f32);
+            let (i, j) = (i as f64, j as f64);
+            simplex.offsets[axis] = [0.0, SIXTH - i, 2.0 * SIXTH - j, -0.5];
+            simplex.narrow[axis] = [0.0, SIXTH32 - i32, 2.0 * SIXTH32 - j32, -0.5];
+            let prime = primes[axis];
+            let one = if first[axis] { prime } else { 0 };
+            let two = if second[axis] { prime } else { 0 };
+            let [a, b, c, d] = simplex.steps;
+            simplex.steps = [a, b.wrapping_add(one), c.wrapping_add(two), d.wrapping_add(prime)];
+            axis += 1;
+        }
+        order += 1;
+    }
+    all
 }
 
 impl Lattice {
@@ -109,6 +176,26 @@ impl Lattice {
             sum += t2 * t2 * (g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i]);
         }
         SCALE * sum
+    }
+
+    /// [`Lattice::value`] within 1e-6, for short waves: the cell is found in f64, the rest is f32,
+    /// four corners at a time.
+    #[inline(always)]
+    pub(super) fn fine_value(&self, at_m: DVec3) -> f64 {
+        let Cell { at, base, order } = self.cell(at_m);
+        let simplex = &SIMPLICES[order];
+        let [ox, oy, oz] = &simplex.narrow;
+        let [x, y, z] = at.map(narrow);
+        let g = simplex.steps.map(|step| &GRADIENTS_F32[slot(mix(base.wrapping_add(step)))]);
+        let mut parts = [0.0_f32; 4];
+        for i in 0..4 {
+            let (dx, dy, dz) = (x + ox[i], y + oy[i], z + oz[i]);
+            let t = 0.5 - dx * dx - dy * dy - dz * dz;
+            let t = if t > 0.0 { t } else { 0.0 };
+            let t2 = t * t;
+            parts[i] = t2 * t2 * (g[i][0] * dx + g[i][1] * dy + g[i][2] * dz);
+        }
+        SCALE * f64::from((parts[0] + parts[1]) + (parts[2] + parts[3]))
     }
 
     /// [`Lattice::value`] and its gradient per metre.
@@ -162,8 +249,7 @@ impl Lattice {
     }
 
     #[inline(always)]
-    fn corners(&self, at_m: DVec3) -> Corners {
-        const SIXTH: f64 = 1.0 / 6.0;
+    fn cell(&self, at_m: DVec3) -> Cell {
         const THIRD: f64 = 1.0 / 3.0;
         let x = self.rows[0].dot(at_m) + self.offset.x;
         let y = self.rows[1].dot(at_m) + self.offset.y;
@@ -173,28 +259,27 @@ impl Lattice {
         let (fx, fy, fz) = (bx - ROUND, by - ROUND, bz - ROUND);
         let unskew = (fx + fy + fz) * SIXTH;
         let (x0, y0, z0) = (x - fx + unskew, y - fy + unskew, z - fz + unskew);
-        // Which coordinates are largest and which are not smallest orders the inner corners.
-        let (xy, yz, xz) = (x0 >= y0, y0 >= z0, x0 >= z0);
-        let first = [xy & xz, !xy & yz, !yz & !xz];
-        let second = [xy | xz, !xy | yz, !(yz & xz)];
-        let [i1, j1, k1] = first.map(f64::from);
-        let [i2, j2, k2] = second.map(f64::from);
+        let order =
+            usize::from(x0 >= y0) | usize::from(y0 >= z0) << 1 | usize::from(x0 >= z0) << 2;
         let base = bx
             .to_bits()
             .wrapping_mul(PRIME_X)
             .wrapping_add(by.to_bits().wrapping_mul(PRIME_Y))
             .wrapping_add(bz.to_bits().wrapping_mul(PRIME_Z))
             .wrapping_add(self.seed);
+        Cell { at: [x0, y0, z0], base, order }
+    }
+
+    #[inline(always)]
+    fn corners(&self, at_m: DVec3) -> Corners {
+        let Cell { at: [x, y, z], base, order } = self.cell(at_m);
+        let simplex = &SIMPLICES[order];
+        let [ox, oy, oz] = &simplex.offsets;
         Corners {
-            dx: [x0, x0 - i1 + SIXTH, x0 - i2 + THIRD, x0 - 0.5],
-            dy: [y0, y0 - j1 + SIXTH, y0 - j2 + THIRD, y0 - 0.5],
-            dz: [z0, z0 - k1 + SIXTH, z0 - k2 + THIRD, z0 - 0.5],
-            hash: [
-                mix(base),
-                mix(base.wrapping_add(step(first))),
-                mix(base.wrapping_add(step(second))),
-                mix(base.wrapping_add(step([true; 3]))),
-            ],
+            dx: ox.map(|o| x + o),
+            dy: oy.map(|o| y + o),
+            dz: oz.map(|o| z + o),
+            hash: simplex.steps.map(|step| mix(base.wrapping_add(step))),
         }
     }
 }
@@ -229,14 +314,13 @@ pub(super) fn ramp(low: f64, high: f64, x: f64) -> f64 {
 }
 
 #[inline]
-fn step(up: [bool; 3]) -> u64 {
-    let [x, y, z] = up.map(|b| u64::from(b).wrapping_neg());
-    (PRIME_X & x).wrapping_add(PRIME_Y & y).wrapping_add(PRIME_Z & z)
+fn gradient(hash: u64) -> &'static [f64; 4] {
+    &GRADIENTS[slot(hash)]
 }
 
 #[inline]
-fn gradient(hash: u64) -> &'static [f64; 4] {
-    &GRADIENTS[(hash >> 59) as usize]
+fn slot(hash: u64) -> usize {
+    (hash >> 59) as usize
 }
 
 #[inline]

@@ -78,13 +78,16 @@ impl Outline {
         let inland = (self.continent(warped_m) - self.coast) / self.spread;
         let wiggle = 0.16 * self.wiggle.value(at_m);
         let breaks = self.breaks.value(at_m);
-        let young = self.belt(0, warped_m, wiggle, 0.12 + 0.06 * breaks)
-            * (0.35 + 0.65 * ramp(-0.35, 0.15, breaks));
-        let old = self.belt(1, warped_m, wiggle, 0.09) * ramp(0.25, -0.35, breaks);
         let land = ramp(-0.03, 0.10, inland);
+        // What would be multiplied by zero is left out: most of the planet lies under water.
+        let share = 0.35 + 0.65 * ramp(-0.35, 0.15, breaks);
+        let young = share * self.belt(0, warped_m, wiggle, 0.12 + 0.06 * breaks);
+        let share = if land > 0.0 { ramp(0.25, -0.35, breaks) } else { 0.0 };
+        let old = if share > 0.0 { share * self.belt(1, warped_m, wiggle, 0.09) } else { 0.0 };
         let belts = 1.0 - (1.0 - young) * (1.0 - 0.5 * old);
         let mountain = belts * land;
-        let upland = ramp(0.0, 0.6, self.uplands.value(at_m));
+        let upland =
+            if land > 0.0 { ramp(0.0, 0.6, self.uplands.value(at_m)) } else { 0.0 };
         let plain = 0.03 + land * (0.03 + 0.16 * upland);
         let rise = young * (1.0 - land);
         let ruggedness = plain + (1.0 - plain) * mountain + 0.12 * rise;

@@ -1,0 +1,143 @@
+//! The bundled flights over the bundled scenes: closed, the same on every machine, still when still.
+//!
+//! In:    flights and presets.
+//! Out:   passes or fails.
+//! Keeps: nothing.
+//! Not here: the same through the command line (`recordings`), drawing (`pictures`).
+
+use overfly::core::frame::{FrameInput, FrameOutput};
+use overfly::core::settings::SceneSettings;
+use overfly::loader::Loader;
+use overfly::replay::{Flight, RunDigest, view_of};
+use overfly::{Overfly, config};
+
+/// A flight in the making: pages arrive in the frame after they were wanted.
+pub struct Tour {
+    pub overfly: Overfly,
+    pub scene: SceneSettings,
+    pub flight: Flight,
+    pub input: FrameInput,
+    pub output: FrameOutput,
+    loader: Loader,
+}
+
+impl Tour {
+    pub fn new(flight: &str, scene: &str, workers: usize) -> Self {
+        let scene = config::load(scene).unwrap();
+        let overfly = Overfly::new(&scene, workers).unwrap();
+        Self {
+            flight: overfly.flight(flight).unwrap(),
+            loader: overfly.loader(2).unwrap(),
+            input: FrameInput::default(),
+            output: FrameOutput::default(),
+            overfly,
+            scene,
+        }
+    }
+
+    /// Frame `index`, drawn or not.
+    pub fn frame(&mut self, index: usize, drawn: bool) {
+        self.input.views.clear();
+        let pose = &self.flight.poses[index];
+        for lens in &self.scene.views {
+            self.input.views.push(view_of(pose, lens, [640, 360], &self.scene.body));
+        }
+        self.loader.fetch(&self.output.wanted, &mut self.input.arrived);
+        if drawn {
+            self.overfly.frame_drawn(&mut self.input, &mut self.output, 0).unwrap();
+        } else {
+            self.overfly.frame(&mut self.input, &mut self.output).unwrap();
+        }
+    }
+
+    /// Repeats frame `index` until nothing changes.
+    pub fn settle(&mut self, index: usize) {
+        for _ in 0..2000 {
+            self.frame(index, false);
+            let counts = &self.output.counts;
+            if counts.leaves > 0 && counts.splits + counts.merges + counts.wanted == 0 {
+                return;
+            }
+        }
+        panic!("no fixed point: {:?}", self.output.counts);
+    }
+
+    pub fn digest_of(&mut self, frames: impl Iterator<Item = usize>) -> u64 {
+        let mut run = RunDigest::default();
+        for index in frames {
+            self.frame(index, false);
+            run.add(&self.output.digest);
+        }
+        run.value()
+    }
+}
+
+/// Flies all of a flight and audits every hundredth frame.
+fn closed_all_the_way(flight: &str) {
+    let mut tour = Tour::new(flight, "earth", 0);
+    let mut audited = 0;
+    for index in 0..tour.flight.poses.len() {
+        tour.frame(index, false);
+        if index % 100 == 0 {
+            tour.overfly.terrain().audit().unwrap_or_else(|what| panic!("frame {index}: {what}"));
+            audited += 1;
+        }
+    }
+    assert!(audited > 100);
+    assert!(tour.output.counts.triangles > 50_000, "{:?}", tour.output.counts);
+}
+
+#[test]
+fn the_surface_is_closed_all_along_rainier() {
+    closed_all_the_way("rainier");
+}
+
+#[test]
+fn the_surface_is_closed_all_along_descent() {
+    closed_all_the_way("descent");
+}
+
+#[test]
+fn the_surface_is_closed_all_along_poles() {
+    closed_all_the_way("poles");
+}
+
+#[test]
+fn worker_counts_do_not_change_a_bit() {
+    for (flight, scene) in [("rainier", "earth"), ("descent", "moon"), ("poles", "small")] {
+        let digests = [0, 1, 2, 4].map(|workers| {
+            Tour::new(flight, scene, workers).digest_of((0..6000).step_by(25))
+        });
+        assert_eq!(digests, [digests[0]; 4], "{flight} over {scene}");
+    }
+}
+
+/// The same in debug and release, on every machine: a change of these is a change of behaviour.
+#[test]
+fn golden_digests_hold() {
+    let golden = [
+        ("rainier", "earth", 0),
+        ("descent", "moon", 0),
+        ("poles", "small", 0),
+    ];
+    let found = golden.map(|(flight, scene, _)| {
+        (flight, scene, Tour::new(flight, scene, 1).digest_of((0..10_000).step_by(50)))
+    });
+    assert_eq!(found, golden, "{found:#x?}");
+}
+
+#[test]
+fn a_still_camera_rests_on_the_mesh_of_a_cold_start() {
+    let mut settled = Tour::new("descent", "small", 0);
+    (0..3000).step_by(40).for_each(|index| settled.frame(index, false));
+    settled.settle(2900);
+    let digest = settled.output.digest;
+    settled.frame(2900, false);
+    let counts = settled.output.counts;
+    assert_eq!((counts.splits, counts.merges, counts.built, counts.wanted), (0, 0, 0, 0));
+    assert_eq!(settled.output.digest, digest);
+    let mut cold = Tour::new("descent", "small", 0);
+    cold.settle(2900);
+    assert_eq!(cold.output.digest.mesh, digest.mesh);
+    assert_eq!(cold.output.digest.vertices, digest.vertices);
+}
