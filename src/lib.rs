@@ -26,7 +26,7 @@ use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
 use crate::core::geodesy::Geodetic;
 use crate::core::scene::{FrameParts, extract, world_of};
 use crate::core::settings::SceneSettings;
-use crate::jobs::{Graph, Span, Spans, StagePanic, StartError, Workers};
+use crate::jobs::{Graph, Span, Spans, StagePanic, StartError, Team, Workers};
 use crate::render_vk::{DrawError, DrawReport, Renderer};
 use crate::replay::Flight;
 use loader::Loader;
@@ -166,7 +166,24 @@ impl Overfly {
         self.house.drawing.get_mut().report.take().transpose().map_err(FrameError::Draw)
     }
 
-    /// Reads the last picture back.
+    /// Draws another view of the last frame, on the caller alone; `None` without a renderer or
+    /// such a view.
+    ///
+    /// # Errors
+    /// Vulkan failed.
+    pub fn draw(
+        &mut self,
+        output: &FrameOutput,
+        view: usize,
+    ) -> Result<Option<DrawReport>, DrawError> {
+        let Drawing { renderer, parts, .. } = self.house.drawing.get_mut();
+        let (Some(renderer), Some(view)) = (renderer, output.views.get(view)) else {
+            return Ok(None);
+        };
+        renderer.draw(view, &self.house.terrain.patches(), parts, &Team::alone()).map(Some)
+    }
+
+    /// Lends the renderer, to read pictures and messages.
     pub fn with_renderer<R>(&mut self, read: impl FnOnce(&mut Renderer) -> R) -> Option<R> {
         self.house.drawing.get_mut().renderer.as_mut().map(read)
     }

@@ -35,13 +35,10 @@ impl Loader {
         let (finished, done) = unbounded();
         let start = |index| {
             let (todo, finished, generator) = (todo.clone(), finished.clone(), generator.clone());
-            std::thread::Builder::new().name(format!("loader {index}")).spawn(move || {
-                for key in todo {
-                    if finished.send(generator.page(key)).is_err() {
-                        break;
-                    }
-                }
-            })
+            let name = format!("loader {index}");
+            std::thread::Builder::new()
+                .name(name)
+                .spawn(move || serve(&todo, &finished, &generator))
         };
         let threads = (0..threads.max(1)).map(start).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -106,6 +103,15 @@ impl Loader {
     fn put(&mut self, page: Box<Page>) {
         self.in_flight.remove(&page.key);
         self.ready.insert(page.key, page);
+    }
+}
+
+/// Makes pages until there is nobody left to ask or to answer.
+fn serve(todo: &Receiver<PageKey>, finished: &Sender<Box<Page>>, generator: &Generator) {
+    for key in todo {
+        if finished.send(generator.page(key)).is_err() {
+            break;
+        }
     }
 }
 

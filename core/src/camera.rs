@@ -55,7 +55,10 @@ impl fmt::Display for ViewFault {
             Self::NotFinite { field } => write!(f, "view: {field} is not finite"),
             Self::NoOrientation => write!(f, "view: orientation is the zero quaternion"),
             Self::FieldOfView { found_rad } => {
-                write!(f, "view: field of view is {found_rad} rad, allowed is 0 to π, both excluded")
+                write!(
+                    f,
+                    "view: field of view is {found_rad} rad, allowed is 0 to π, both excluded"
+                )
             }
             Self::NoPixels => write!(f, "view: width and height must be at least 1 pixel"),
             Self::Near { found_m } => {
@@ -73,7 +76,8 @@ impl View {
     /// # Errors
     /// The first fault found.
     pub fn check(&self) -> Result<(), ViewFault> {
-        let finite = |ok: bool, field| if ok { Ok(()) } else { Err(ViewFault::NotFinite { field }) };
+        let finite =
+            |ok: bool, field| if ok { Ok(()) } else { Err(ViewFault::NotFinite { field }) };
         finite(self.eye.0.is_finite(), "eye")?;
         finite(self.orientation.is_finite(), "orientation")?;
         finite(self.field_of_view.0.is_finite(), "field of view")?;
@@ -98,7 +102,12 @@ impl View {
 ///
 /// - In: heading clockwise from north, pitch nose up, roll right wing down; radians.
 /// - Out: camera axes (x right, y up, z backward) to body-fixed axes.
-pub fn orientation_from_attitude(at: Geodetic, heading: Radians, pitch: Radians, roll: Radians) -> DQuat {
+pub fn orientation_from_attitude(
+    at: Geodetic,
+    heading: Radians,
+    pitch: Radians,
+    roll: Radians,
+) -> DQuat {
     let half = core::f64::consts::FRAC_1_SQRT_2;
     // A quarter turn about x lays the camera, which looks down −z, along north.
     let nose_north = DQuat::from_xyzw(half, 0.0, 0.0, half);
@@ -111,7 +120,8 @@ pub fn orientation_from_attitude(at: Geodetic, heading: Radians, pitch: Radians,
 
 /// A rotation about a unit axis, through overfly's own trigonometry.
 fn rotation(axis: DVec3, angle_rad: f64) -> DQuat {
-    let (s, c) = (crate::geodesy::trig::sin(angle_rad / 2.0), crate::geodesy::trig::cos(angle_rad / 2.0));
+    let (s, c) =
+        (crate::geodesy::trig::sin(angle_rad / 2.0), crate::geodesy::trig::cos(angle_rad / 2.0));
     DQuat::from_xyzw(axis.x * s, axis.y * s, axis.z * s, c)
 }
 

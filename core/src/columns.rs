@@ -113,7 +113,9 @@ impl<T> Pool<T> {
 
     /// Gives a taken place back.
     pub fn give_back(&mut self, id: Id<T>) {
-        debug_assert!(id.index() < self.used_end && !self.free.contains(&id) || self.free.len() > 64);
+        debug_assert!(
+            id.index() < self.used_end && !self.free.contains(&id) || self.free.len() > 64
+        );
         self.free.push(id);
     }
 

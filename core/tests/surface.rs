@@ -7,6 +7,7 @@
 
 mod rig;
 
+use overfly_core::geodesy::trig::exp;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::lattice::{fold, key_of};
 use proptest::prelude::*;
@@ -83,7 +84,8 @@ fn no_frame_spends_more_operations_than_its_counts_allow() {
 
 #[test]
 fn several_views_refine_for_each_of_them() {
-    let settings = scene(4, 200_000);
+    let mut settings = scene(4, 400_000);
+    settings.lod.tolerance.0 = 100.0;
     let views = [
         view(&EARTH, at(20.0, 30.0, 9_000.0), 40.0, -20.0),
         view(&EARTH, at(20.0, 30.0, 9_000.0), 220.0, -20.0),
@@ -206,7 +208,7 @@ proptest! {
         settings.lod.merges_max = 60;
         let mut rig = Rig::new(&settings, 0);
         for (lat, lon, log_height, mask) in steps {
-            let looking = view(&EARTH, at(lat, lon, 10_f64.powf(log_height)), lon, -25.0);
+            let looking = view(&EARTH, at(lat, lon, exp(log_height * core::f64::consts::LN_10)), lon, -25.0);
             for turn in 0..6_u64 {
                 rig.frame(&[looking], |i| mask >> ((i as u64 * 7 + turn) % 64) & 1 == 1);
                 prop_assert!(rig.output.counts.triangles <= settings.lod.triangles_max);

@@ -29,7 +29,7 @@ const SUN_COS: f32 = 0.99998919;                          // cosine of the disc'
 const SUN_DISC: f32 = 60.0;                               // radiance of the disc over SUN_LIGHT
 const SKY_LIGHT: vec3<f32> = vec3<f32>(0.040, 0.058, 0.088); // sky on flat ground, per SUN_LIGHT
 const NIGHT_LIGHT: vec3<f32> = vec3<f32>(0.012, 0.016, 0.026); // never quite dark
-const MOON_LIGHT: vec3<f32> = vec3<f32>(0.26, 0.31, 0.42);   // irradiance of a full moon, raised
+const MOON_LIGHT: vec3<f32> = vec3<f32>(0.55, 0.66, 0.88);   // irradiance of a moon, far too bright
 const EXPOSURE: f32 = 0.37;
 
 // ---- Air: one exponential profile of molecules and haze together ----

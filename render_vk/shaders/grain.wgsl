@@ -1,13 +1,13 @@
 // Grain of the ground: value noise on a lattice that is fixed to the body, from 2 km to 12 cm.
 
-// ---- Octaves: cells halve from one to the next ----
+// ---- Octaves: each has cells of a quarter of the last one's size, fine ones of half ----
 const TILE_M: f32 = 4096.0;       // cells count from tiles: exact however far from the centre
 const COARSEST_M: f32 = 2048.0;
-const OCTAVES: i32 = 15;
+const OCTAVES: i32 = 12;
 const FINE_M: f32 = 40.0;         // cells below this are `fine`, above `broad`
-const BUMPY_M: f32 = 160.0;       // cells above this do not tilt the ground
-const SEEN_PX: vec2<f32> = vec2<f32>(1.6, 4.0);      // a cell of so many pixels: none, all of it
-const BROAD: f32 = 0.50;          // share of an octave
+const BUMPY_M: f32 = 40.0;        // cells above this tilt the ground the less
+const SEEN_PX: vec2<f32> = vec2<f32>(2.0, 4.5);      // a cell of so many pixels: none, all of it
+const BROAD: f32 = 0.62;          // share of an octave
 const FINE: f32 = 0.42;
 const TILT: f32 = 0.15;
 const SHIFT: vec3<f32> = vec3<f32>(0.37, 0.61, 0.83);        // of each octave, so that no two align
@@ -27,10 +27,9 @@ struct Grain {
     ripple_tilt: vec3<f32>,
 }
 
-// Two values of 16 bits for a corner of the lattice. Source: the "lowbias32" constants of Wellons.
+// Two values of 12 bits for a corner of the lattice: one round of mixing is enough for the eye.
 fn corner(at: u32) -> vec2<f32> {
-    var h = (at ^ (at >> 16u)) * 0x7feb352du;
-    h = (h ^ (h >> 15u)) * 0x846ca68bu;
+    let h = (at ^ (at >> 15u)) * 0x846ca68bu;
     return vec2<f32>(f32((h >> 8u) & 0xfffu), f32(h >> 20u));
 }
 
@@ -78,12 +77,12 @@ fn grain_at(offset: vec3<f32>, footprint_m: f32) -> Grain {
         let at = p / cell_m + SHIFT * f32(i);
         let base = floor(at);
         let cell = vec3<i32>(tile) * i32(TILE_M / cell_m) + vec3<i32>(base);
-        let n = noise(cell ^ vec3<i32>(i * 0x3c6ef35), at - base);
+        let n = noise(cell + vec3<i32>(i * 0x3c6ef35), at - base);
         let is_fine = select(0.0, seen, cell_m < FINE_M);
         out.broad += n.value * ((seen - is_fine) * BROAD);
         out.fine += n.value * (is_fine * FINE);
-        out.tilt += n.gradient * select(0.0, seen * TILT, cell_m < BUMPY_M);
-        cell_m *= 0.5;
+        out.tilt += n.gradient * (seen * TILT * min(BUMPY_M / cell_m, 1.0));
+        cell_m *= select(0.5, 0.25, cell_m > FINE_M);
     }
     let rippled = smoothstep(SEEN_PX.x, SEEN_PX.y, 0.5 * RIPPLES_M / footprint_m);
     let phase = 2.0 * PI * fract(dot(RIPPLES, p)) + 5.0 * out.fine.y;

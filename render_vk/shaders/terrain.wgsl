@@ -9,12 +9,12 @@ const FOREST: vec3<f32> = vec3<f32>(0.034, 0.052, 0.019);
 const TUNDRA: vec3<f32> = vec3<f32>(0.118, 0.108, 0.072);
 const ROCK: vec3<f32> = vec3<f32>(0.172, 0.166, 0.142);
 const DARK_ROCK: vec3<f32> = vec3<f32>(0.095, 0.090, 0.086);
-const SNOW: vec3<f32> = vec3<f32>(0.60, 0.63, 0.67);
+const SNOW: vec3<f32> = vec3<f32>(0.50, 0.525, 0.56);
 const REGOLITH_DARK: vec3<f32> = vec3<f32>(0.060, 0.058, 0.055);
 const REGOLITH_BRIGHT: vec3<f32> = vec3<f32>(0.170, 0.163, 0.152);
 
 const STRAW: vec3<f32> = vec3<f32>(1.22, 1.06, 0.84);  // factors on the colour of plants
-const LEAVES: vec3<f32> = vec3<f32>(0.80, 0.95, 1.00);
+const LEAVES: vec3<f32> = vec3<f32>(0.82, 0.98, 0.72);
 
 // ---- Where they lie: pairs are (none of it, all of it) ----
 const BEACH_M: vec2<f32> = vec2<f32>(9.0, 2.0);       // height
@@ -27,8 +27,8 @@ const ROCK_LAYER: vec2<f32> = vec2<f32>(0.45, 0.95);  // the rock layer, 0 to 1
 const SNOW_C: vec2<f32> = vec2<f32>(-0.5, -4.5);      // temperature of snow on flat ground
 const SNOW_SLOPE_C: f32 = 14.0;                       // a cliff must be this much colder
 const SNOW_SLOPE: vec2<f32> = vec2<f32>(0.62, 0.34);  // too steep for snow to lie
-const PATCHES: f32 = 0.10;                            // moisture, by the grain
-const SNOW_PATCHES_C: f32 = 1.6;                      // temperature, by the grain
+const PATCHES: f32 = 0.09;                            // moisture, by the grain
+const SNOW_PATCHES_C: f32 = 1.4;                      // temperature, by the grain
 const RIPPLED: f32 = 0.25;                            // slope of the ripples in sand
 const SEA_ICE_C: vec2<f32> = vec2<f32>(-7.0, -13.0);
 
@@ -136,7 +136,8 @@ fn plants(moisture: f32, celsius: f32, grain: Grain) -> Cover {
 
 fn land(point: Point, slope: f32, grain: Grain, pixel_m: f32) -> Cover {
     let mottle = grain.broad.x + 0.6 * grain.fine.x;
-    let celsius = point.layers.w * 80.0 - 40.0 + SNOW_PATCHES_C * mottle;
+    let celsius = point.layers.w * 80.0 - 40.0 
+        + SNOW_PATCHES_C * (grain.broad.x + 0.35 * grain.fine.x);
     var cover = plants(point.layers.z, celsius, grain);
     let sand = Cover(SAND * (1.0 + 0.10 * mottle + 0.07 * grain.ripple), 0.12, 1.0);
     cover = covered(cover, sand, ramp(BEACH_M, point.height_m + 1.5 * mottle) * view.sea);
@@ -159,7 +160,7 @@ fn regolith(layers: vec4<f32>, grain: Grain) -> Cover {
     let mottle = 0.10 * grain.broad.y + 0.07 * grain.fine.y;
     let bright = clamp(0.35 + fresh - 0.35 * layers.z + mottle, 0.0, 1.0);
     let stone = mix(REGOLITH_DARK, REGOLITH_BRIGHT, bright);
-    return Cover(stone * (1.0 + 0.10 * grain.broad.x + 0.16 * grain.fine.x), 0.55, 0.0);
+    return Cover(stone * (1.0 + 0.10 * grain.broad.x + 0.16 * grain.fine.x), 0.42, 0.0);
 }
 
 // Light of sun and sky on ground of this normal, over pi.
@@ -192,7 +193,7 @@ fn water(point: Point, up: vec3<f32>, ray: vec3<f32>, light: vec3<f32>) -> vec3<
     let mirror = 0.02 + 0.55 * grazing2 * grazing2 * grazing;
     let sun_cos = dot(view.sun, up);
     let even = select(0.6, day(sun_cos), view.sun_on != 0.0);
-    var shine = SUN_LIGHT * REFLECTED_SKY * even;
+    var shine = SUN_LIGHT * REFLECTED_SKY * even + NIGHT_LIGHT;
     let middle = normalize(view.sun - ray);
     let cosine = max(dot(middle, up), 1e-3);
     let tangent2 = (1.0 - cosine * cosine) / (cosine * cosine);

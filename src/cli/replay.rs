@@ -360,7 +360,8 @@ fn frame(
     run.source.fill(played, &run.scene, run.size_px, input);
     let arriving = arriving(run, played, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
-    let mut record = RecordedFrame { time_s: input.time_s, arrived: arriving, ..Default::default() };
+    let mut record =
+        RecordedFrame { time_s: input.time_s, arrived: arriving, ..Default::default() };
     if run.recorder.is_some() {
         record.views.extend_from_slice(&input.views);
     }
@@ -375,7 +376,7 @@ fn frame(
     }
     let end_ns = now_ns();
     if still && drawn {
-        take_still(run, overfly, index)?;
+        take_stills(run, overfly, index, output)?;
     }
     if let Some(recorder) = &mut run.recorder {
         record.digest = output.digest;
@@ -408,10 +409,25 @@ fn arriving(run: &mut Run, played: usize, wanted: &[PageKey]) -> Vec<PageKey> {
     run.coming.drain(..due).map(|(_, key)| key).collect()
 }
 
-fn take_still(run: &mut Run, overfly: &mut Overfly, index: usize) -> Result<(), Failure> {
-    let pixels = overfly.with_renderer(|renderer| renderer.read_pixels());
-    if let Some(pixels) = pixels.transpose()? {
-        run.pictures.add(index, "", run.size_px, pixels)?;
+/// A still of each view; the first is drawn already.
+fn take_stills(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    index: usize,
+    output: &FrameOutput,
+) -> Result<(), Failure> {
+    for view in 0..output.views.len() {
+        if view > 0 {
+            overfly.draw(output, view)?;
+        }
+        let name = match run.scene.views.get(view) {
+            Some(lens) if output.views.len() > 1 => format!("{}-", lens.name),
+            _ => String::new(),
+        };
+        let pixels = overfly.with_renderer(|renderer| renderer.read_pixels());
+        if let Some(pixels) = pixels.transpose()? {
+            run.pictures.add(index, &name, run.size_px, pixels)?;
+        }
     }
     Ok(())
 }

@@ -22,11 +22,7 @@ pub fn command() -> Command {
 pub fn overfly(arguments: &[&str]) -> Outcome {
     let done = command().args(arguments).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    Outcome {
-        code: done.status.code().unwrap(),
-        out: text(&done.stdout),
-        err: text(&done.stderr),
-    }
+    Outcome { code: done.status.code().unwrap(), out: text(&done.stdout), err: text(&done.stderr) }
 }
 
 impl Outcome {
@@ -84,7 +80,9 @@ fn check_reports_every_fault_of_a_scene_at_once() {
     std::fs::write(&file, text).unwrap();
     let Outcome { code, err, .. } = overfly(&["check", &file.display().to_string()]);
     assert_eq!(code, 2);
-    for part in ["scene.ron:3:24", "lod.patch_depth", "0, 2, 4, 6", "tolerance_px", "memory.pages_mib"] {
+    for part in
+        ["scene.ron:3:24", "lod.patch_depth", "0, 2, 4, 6", "tolerance_px", "memory.pages_mib"]
+    {
         assert!(err.contains(part), "{err} lacks {part}");
     }
     assert_eq!(overfly(&["check", "earth"]).code, 0);
@@ -96,7 +94,15 @@ fn json_holds_a_column_for_every_stage_and_count() {
     let file = folder.path().join("run.json");
     let path = file.display().to_string();
     let done = overfly(&[
-        "replay", "poles", "--scene", "small", "--frames", "10..40", "--no-render", "--json", &path,
+        "replay",
+        "poles",
+        "--scene",
+        "small",
+        "--frames",
+        "10..40",
+        "--no-render",
+        "--json",
+        &path,
     ]);
     assert_eq!(done.code, 0, "{done:?}");
     let json: serde_json::Value =

@@ -105,9 +105,8 @@ fn the_surface_is_closed_all_along_poles() {
 #[test]
 fn worker_counts_do_not_change_a_bit() {
     for (flight, scene) in [("rainier", "earth"), ("descent", "moon"), ("poles", "small")] {
-        let digests = [0, 1, 2, 4].map(|workers| {
-            Tour::new(flight, scene, workers).digest_of((0..6000).step_by(25))
-        });
+        let digests = [0, 1, 2, 4]
+            .map(|workers| Tour::new(flight, scene, workers).digest_of((0..6000).step_by(25)));
         assert_eq!(digests, [digests[0]; 4], "{flight} over {scene}");
     }
 }
@@ -115,11 +114,7 @@ fn worker_counts_do_not_change_a_bit() {
 /// The same in debug and release, on every machine: a change of these is a change of behaviour.
 #[test]
 fn golden_digests_hold() {
-    let golden = [
-        ("rainier", "earth", 0),
-        ("descent", "moon", 0),
-        ("poles", "small", 0),
-    ];
+    let golden = [("rainier", "earth", 0), ("descent", "moon", 0), ("poles", "small", 0)];
     let found = golden.map(|(flight, scene, _)| {
         (flight, scene, Tour::new(flight, scene, 1).digest_of((0..10_000).step_by(50)))
     });

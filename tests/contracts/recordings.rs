@@ -28,7 +28,8 @@ fn a_recording_replays_to_the_same_digest_for_any_workers() {
         assert!(again.out.contains("same as recorded"), "{again:?}");
         assert_eq!(again.digest(), digest);
     }
-    let on_time = overfly(&["replay", "poles", "--no-render", "--scene", "small", "--frames", "50..400"]);
+    let on_time =
+        overfly(&["replay", "poles", "--no-render", "--scene", "small", "--frames", "50..400"]);
     assert_ne!(on_time.digest(), digest, "a late page must show");
 }
 
@@ -36,8 +37,7 @@ fn a_recording_replays_to_the_same_digest_for_any_workers() {
 fn a_recording_is_refused_in_another_scene_with_what_differs() {
     let folder = tempfile::tempdir().unwrap();
     let (file, _) = record(folder.path(), &["--scene", "small", "--frames", "0..20"]);
-    let Outcome { code, err, .. } =
-        overfly(&["replay", &file, "--no-render", "--scene", "moon"]);
+    let Outcome { code, err, .. } = overfly(&["replay", &file, "--no-render", "--scene", "moon"]);
     assert_eq!(code, 2, "{err}");
     for part in ["another scene", "body.a_m", "1000.0", "1737400.0"] {
         assert!(err.contains(part), "{err} lacks {part}");
@@ -98,5 +98,8 @@ fn a_recording_that_diverges_names_frame_and_stage() {
     writer.finish().unwrap();
     let played = overfly(&["replay", &forged.display().to_string(), "--no-render"]);
     assert_eq!(played.code, 1, "{played:?}");
-    assert!(played.err.contains("diverged from the recording in frame 50, stage mesh"), "{played:?}");
+    assert!(
+        played.err.contains("diverged from the recording in frame 50, stage mesh"),
+        "{played:?}"
+    );
 }

@@ -160,6 +160,11 @@ fn test(root: &Path) -> Result<(), Stopped> {
     }
     let required = vulkan == Vulkan::Lavapipe || std::env::var_os(require).is_some();
     let tested = run_tests(root, &step);
+    let why = "the digests of the debug build, from the release build";
+    let golden = Step::new("release", why, &cargo());
+    let arguments =
+        ["test", "--release", "--locked", "--package", "overfly", "--test", "contracts"];
+    let tested = tested.and(run_tests(root, &golden.with(&arguments).with(&["golden"])));
     if required {
         println!("Vulkan tests had to run: {require} was set.");
     } else {

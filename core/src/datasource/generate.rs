@@ -93,7 +93,8 @@ impl Generator {
             let sagitta_m = edge_m * edge_m / (8.0 * curvature_min);
             let ground_m = if drowned { 0.0 } else { self.planet.residual_m(edge_m, ruggedness) };
             // Where water meets land, an edge cuts the corner between them.
-            let corner_m = if shore { self.planet.variation_m(edge_m, ruggedness) / 2.0 } else { 0.0 };
+            let corner_m =
+                if shore { self.planet.variation_m(edge_m, ruggedness) / 2.0 } else { 0.0 };
             narrow(ground_m + corner_m + sagitta_m)
         };
         let [odd, even] = edges(self.patch_depth);

@@ -43,9 +43,8 @@ impl PageKey {
     /// Back from its 64 bits; `None` where they name no page.
     pub fn from_bits(bits: u64) -> Option<Self> {
         let key = Self(bits);
-        let fits = key.depth() <= DEPTH_MAX
-            && key.x() >> key.depth() == 0
-            && key.y() >> key.depth() == 0;
+        let fits =
+            key.depth() <= DEPTH_MAX && key.x() >> key.depth() == 0 && key.y() >> key.depth() == 0;
         fits.then_some(key)
     }
 

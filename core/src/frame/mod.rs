@@ -73,7 +73,11 @@ impl Terrain {
         let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
         let ranges = settings.depth.splits_m.len() + 1;
         Self {
-            horizon: Horizon::new(&settings.body, generator.planet().height_range_m(), settings.sea),
+            horizon: Horizon::new(
+                &settings.body,
+                generator.planet().height_range_m(),
+                settings.sea,
+            ),
             input: Mutex::default(),
             eyes: RwLock::default(),
             pages: RwLock::new(Pages::new(limits.pages)),

@@ -54,7 +54,9 @@ pub fn consistent(
             }
         }
     }
-    ensure(queues.lengths() == queued, || format!("queues {:?} hold {queued:?}", queues.lengths()))?;
+    ensure(queues.lengths() == queued, || {
+        format!("queues {:?} hold {queued:?}", queues.lengths())
+    })?;
     ensure(leaves == diamonds.leaves, || format!("{} leaves, found {leaves}", diamonds.leaves))?;
     ensure(patches.live() == leaves, || format!("{} patches, {leaves} leaves", patches.live()))?;
     for (index, &count) in pages.users.as_slice().iter().enumerate() {
@@ -130,7 +132,9 @@ pub fn triangles(diamonds: &Diamonds, patches: &Patches) -> Vec<[IVec3; 3]> {
         for side in 0..2 {
             if node.patches[side].is_some() {
                 let points = lattice_points(node.shape.triangle(side), patches.patch_depth);
-                all.extend(pattern.chunks_exact(3).map(|t| [0, 1, 2].map(|i| points[t[i] as usize])));
+                all.extend(
+                    pattern.chunks_exact(3).map(|t| [0, 1, 2].map(|i| points[t[i] as usize])),
+                );
             }
         }
     }
@@ -197,5 +201,7 @@ fn one_position_each(diamonds: &Diamonds, patches: &Patches) -> Result<(), Strin
     positions.sort_unstable();
     positions.dedup();
     let twice = positions.windows(2).find(|pair| pair[0].0 == pair[1].0);
-    ensure(twice.is_none(), || format!("{:x?} is one point with two positions", twice.map(|pair| pair[0].0)))
+    ensure(twice.is_none(), || {
+        format!("{:x?} is one point with two positions", twice.map(|pair| pair[0].0))
+    })
 }

@@ -61,7 +61,6 @@ pub fn page_is_finest(level: u8, patch_depth: u8) -> bool {
     grid_depth(level, patch_depth) >= PAGE_BITS
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@
 //! Keeps: blocks of scratch, one a chunk, so that chunks are independent.
 //! Not here: uploading (`overfly_render_vk`), the index pattern (`topology`).
 
-use super::patches::{BuiltPatch, Patches, PatchVertex};
+use super::patches::{BuiltPatch, PatchVertex, Patches};
 use super::topology::segments;
 use crate::columns::Id;
 use crate::datasource::Page;

@@ -29,10 +29,8 @@ pub struct Block {
 impl Block {
     /// As many blocks as `patches` slots need, with room in every list.
     pub fn for_patches(patches: u32, ranges: usize) -> Vec<Self> {
-        let block = || Self {
-            lists: (0..ranges).map(|_| Vec::with_capacity(CHUNK)).collect(),
-            digest: 0,
-        };
+        let block =
+            || Self { lists: (0..ranges).map(|_| Vec::with_capacity(CHUNK)).collect(), digest: 0 };
         (0..(patches as usize).div_ceil(CHUNK)).map(|_| block()).collect()
     }
 }

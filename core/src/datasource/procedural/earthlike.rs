@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::bounds::{Bounds, Growth, SHARP, SMOOTH, TURNING, Term, UNERODED, early};
-use super::noise::{Lattice, PEAK, mix, ramp, round};
+use super::noise::{Lattice, Lattices, PEAK, mix, ramp, round};
 use super::outline::{Outline, Shape};
 use super::{Layers, ProceduralSettings, Sample, byte};
 
@@ -20,11 +20,10 @@ pub(super) struct Earthlike {
     outline: Outline,
     ridges: Vec<Ridge>,
     gullies: Vec<Octave>,
-    details: Vec<Detail>,
-    moisture: [Lattice; 2],
-    weather: Lattice,
-    /// How many details are longer than [`LONG_M`].
-    long_details: usize,
+    ridge_lattices: Lattices<6>,
+    details: Vec<Details>,
+    /// Weather, and moisture in wide and in narrow waves.
+    climate: Lattices<3>,
     /// Inverses of [`FADE_DEPTH_M`] and [`BEACH_M`] on this planet.
     per_depth: f64,
     per_beach: f64,
@@ -46,6 +45,15 @@ struct Octave {
     amplitude_m: f64,
 }
 
+/// Four octaves of detail, evaluated together.
+struct Details {
+    lattices: Lattices<4>,
+    octaves: [Detail; 4],
+    /// All are longer than [`LONG_M`].
+    long: bool,
+}
+
+#[derive(Clone, Copy)]
 struct Detail {
     lattice: Lattice,
     wavelength_m: f64,
@@ -78,6 +86,9 @@ const STEERING_CREST: f64 = 0.20;
 const LONG_M: f64 = 400.0;
 /// Depth at which shorter details begin to fade, to be gone at twice of it.
 const FADE_DEPTH_M: f64 = 50.0;
+/// Base heights below which the sea floor has no waves shorter than 100 km, and above which it has
+/// all; on a planet of the Earth's size.
+const ABYSS_M: [f64; 2] = [-4250.0, -3850.0];
 /// Height from which ground is no beach, on a planet of the Earth's size.
 const BEACH_M: f64 = 12.0;
 /// Noise at the foot of a knoll.
@@ -116,17 +127,19 @@ impl Earthlike {
         let gully_start = ridges[ridges.len() - 1].wavelength_m * 0.8;
         let gullies = gully_octaves(gully_start, 250.0 * half, settings.relief, &mut next);
         let details = detail_octaves(gully_start, settings, &mut next);
-        let long_details = details.iter().take_while(|o| o.wavelength_m > LONG_M).count();
+        let ridge_lattices = Lattices::new([0, 1, 2, 3, 4, 5].map(|i: usize| ridges[i].lattice));
+        let moisture = [Lattice::new(3.0e6 * size, next()), Lattice::new(5.0e5 * finer, next())];
+        let weather = Lattice::new(2.5e6 * size, next());
+        let climate = Lattices::new([weather, moisture[0], moisture[1]]);
         let body = Earthlike {
             radius_m: settings.radius_m,
             vertical,
             outline,
             ridges,
+            ridge_lattices,
             gullies,
             details,
-            moisture: [Lattice::new(3.0e6 * size, next()), Lattice::new(5.0e5 * finer, next())],
-            weather: Lattice::new(2.5e6 * size, next()),
-            long_details,
+            climate,
             per_depth: 1.0 / (FADE_DEPTH_M * settings.relief.max(1e-3)),
             per_beach: 1.0 / (BEACH_M * vertical.max(1e-6)),
             slope_scale: 0.10 * settings.relief.max(1e-3),
@@ -151,34 +164,37 @@ impl Earthlike {
 
     /// Height and slope of coasts and mountain ridges.
     fn ridged(&self, at_m: DVec3, shape: &Shape) -> (f64, DVec3) {
-        let mut height_m = 0.0;
-        let mut slope = DVec3::ZERO;
-        if shape.mountain <= 0.0 {
-            // Nothing needs the slope of the deep sea floor.
-            let shallow = ramp(-3500.0, -2000.0, shape.base_m);
-            for octave in &self.ridges {
-                if shallow > 0.0 {
-                    let (value, gradient) = octave.lattice.value_and_gradient(at_m);
-                    height_m += octave.coast_m * value;
-                    slope += gradient * octave.coast_m;
-                } else {
-                    height_m += octave.coast_m * octave.lattice.value(at_m);
-                }
-            }
-            return (height_m, slope * shallow);
+        if shape.mountain <= 0.0 && shape.ruggedness <= UNERODED {
+            return (self.coasts_m(at_m, shape.base_m), DVec3::ZERO);
         }
+        let (mut height_m, mut slope) = (0.0, DVec3::ZERO);
+        let cells = self.ridge_lattices.cells(at_m);
         let mut crest = 1.0;
-        for octave in &self.ridges {
-            let (value, gradient) = octave.lattice.value_and_gradient(at_m);
+        for (octave, cell) in self.ridges.iter().zip(&cells) {
+            let (value, gradient) = cell.value_and_gradient();
             let rounded = (value * value + CREST * CREST).sqrt();
             let ridge = 1.0 - 2.0 * rounded;
             let amplitude_m = octave.ridge_m * shape.mountain * crest;
             height_m += octave.coast_m * value + amplitude_m * ridge;
             let broad = (value * value + STEERING_CREST * STEERING_CREST).sqrt();
-            slope += gradient * (octave.coast_m - 2.0 * amplitude_m * value / broad);
+            let per_value_m = octave.coast_m - 2.0 * amplitude_m * value / broad;
+            slope += octave.lattice.per_metre(gradient * per_value_m);
             crest = (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * crest);
         }
-        (height_m, slope)
+        (height_m, slope * ramp(UNERODED, UNERODED + 0.03, shape.ruggedness))
+    }
+
+    /// Height of the same octaves where there are no ridges. The deep sea floor lacks short ones.
+    fn coasts_m(&self, at_m: DVec3, base_m: f64) -> f64 {
+        let cells = self.ridge_lattices.cells(at_m);
+        let share = ramp(ABYSS_M[0], ABYSS_M[1], base_m);
+        let count = if share > 0.0 { self.ridges.len() } else { 2 };
+        let mut coast_m = 0.0;
+        for (i, (octave, cell)) in self.ridges.iter().zip(&cells).take(count).enumerate() {
+            let share = if i < 2 { 1.0 } else { share };
+            coast_m += share * octave.coast_m * cell.narrow_value();
+        }
+        coast_m
     }
 
     /// Height of the gullies, and the slope with them.
@@ -203,36 +219,47 @@ impl Earthlike {
     fn detailed(&self, at_m: DVec3, ground: &Ground) -> (f64, f64) {
         let ruggedness = ground.shape.ruggedness;
         let mut height_m = ground.height_m;
+        let share = ramp(ABYSS_M[0], ABYSS_M[1], ground.shape.base_m);
+        if share <= 0.0 {
+            return (height_m, 0.0);
+        }
         let mut local = 0.35 + 0.65 * ground.steep / (ground.steep + 0.06);
         let (mut swell, mut last) = (0.0, 0.0);
-        let (long, short) = self.details.split_at(self.long_details);
-        for octave in long {
-            let value = octave.lattice.fine_value(at_m);
-            height_m += (octave.fixed_m + octave.rugged_m * ruggedness * local) * value;
-            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
-            swell = 0.6 * swell + value;
-            last = value;
+        let count = self.details.iter().take_while(|four| four.long).count();
+        let (long, short) = self.details.split_at(count);
+        for four in long {
+            let values = four.lattices.fine_values(at_m);
+            for (octave, value) in four.octaves.iter().zip(values) {
+                height_m += share * (octave.fixed_m + octave.rugged_m * ruggedness * local) * value;
+                local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
+                swell = 0.6 * swell + value;
+                last = value;
+            }
         }
         let above_m = height_m.abs();
         let deep = if height_m < 0.0 { above_m * self.per_depth - 1.0 } else { 0.0 };
         if deep >= 1.0 {
             return (height_m, last);
         }
-        let seen = 1.0 - ramp(0.0, 1.0, deep);
+        let seen = share * (1.0 - ramp(0.0, 1.0, deep));
         // Some plains are flat and some are hummocky; beaches and the water's edge are smooth.
         let dry = ramp(0.1, 1.0, above_m * self.per_beach);
         let lively = seen * (0.12 + 0.88 * dry) * (0.3 + 0.7 * ramp(-0.35, 0.4, swell));
         let rugged = seen * early(ruggedness);
-        for octave in short {
-            let value = octave.lattice.fine_value(at_m);
-            let amplitude_m = octave.fixed_m * lively + octave.rugged_m * rugged * local;
-            let knoll = (value - KNOLL_FOOT).max(0.0);
-            let bed = (last + MEANDER * value) * PER_BED;
-            let bank = (1.0 - bed * bed).max(0.0);
-            height_m += amplitude_m * value + octave.knoll_m * lively * (knoll * knoll)
-                - octave.bed_m * (seen * dry) * (bank * bank);
-            local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
-            last = value;
+        // Streams run on gentle ground above the sea; mountains have gullies.
+        let streams = ramp(0.1, 1.0, height_m * self.per_beach) * (1.0 - early(ruggedness));
+        for four in short {
+            let values = four.lattices.fine_values(at_m);
+            for (octave, value) in four.octaves.iter().zip(values) {
+                let amplitude_m = octave.fixed_m * lively + octave.rugged_m * rugged * local;
+                let knoll = (value - KNOLL_FOOT).max(0.0);
+                let bed = (last + MEANDER * value) * PER_BED;
+                let bank = (1.0 - bed * bed).max(0.0);
+                height_m += amplitude_m * value + octave.knoll_m * lively * (knoll * knoll)
+                    - octave.bed_m * streams * (bank * bank);
+                local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
+                last = value;
+            }
         }
         (height_m, last)
     }
@@ -245,12 +272,12 @@ impl Earthlike {
         let grain = grain * 1000.0;
         let dither = (grain - round(grain)) / 255.0;
         let above_m = height_m.max(0.0) / self.vertical.max(1e-9);
-        let weather = self.weather.fine_value(at_m);
+        let [weather, wide, narrow] = self.climate.narrow_values(at_m);
         // Sine of latitude squared: warm to 30 degrees, steep in the westerlies, cold caps.
         let north = n.z * n.z;
         let polar = north * north * north * north;
         let celsius = 30.0 - 36.0 * north - 18.0 * polar + 6.0 * weather - 0.0065 * above_m;
-        let wet = self.moisture[0].fine_value(at_m) + 0.4 * self.moisture[1].fine_value(at_m);
+        let wet = wide + 0.4 * narrow;
         let tropics = 1.0 - ramp(0.0, 0.12, north);
         let deserts = ramp(0.05, 0.18, north) * (1.0 - ramp(0.25, 0.45, north));
         let moist = 0.55 + 0.30 * tropics - 0.38 * deserts + 0.55 * wet + 0.15 * mountain
@@ -284,8 +311,8 @@ impl Earthlike {
             let term = grown(o.wavelength_m, GULLY * o.amplitude_m);
             terms.push(Term { curvature: TURNING, growth: Growth::Eroded, ..term });
         }
-        for (i, o) in self.details.iter().enumerate() {
-            let growth = if i < self.long_details { Growth::Even } else { Growth::Early };
+        for (four, o) in self.details.iter().flat_map(|f| f.octaves.iter().map(move |o| (f, o))) {
+            let growth = if four.long { Growth::Even } else { Growth::Early };
             let term = grown(o.wavelength_m, o.rugged_m);
             terms.push(Term { fixed_m: o.fixed_m + KNOLL * o.knoll_m, growth, ..term });
             if o.bed_m > 0.0 {
@@ -299,6 +326,10 @@ impl Earthlike {
         }
     }
 
+    fn octaves(&self) -> impl Iterator<Item = &Detail> {
+        self.details.iter().flat_map(|four| &four.octaves)
+    }
+
     /// Every octave at its extreme at once. A ridge octave below its mean flattens those after it
     /// to 0.45 of themselves, hence the share of the valleys.
     fn height_range_m(&self) -> [f64; 2] {
@@ -307,8 +338,8 @@ impl Earthlike {
         let first_m = self.ridges[0].ridge_m;
         let valleys_m = first_m + 0.45 * (crests_m - first_m);
         let gullies_m: f64 = self.gullies.iter().map(|o| o.amplitude_m).sum();
-        let details_m = |r: f64| self.details.iter().map(|o| o.highest_m(r)).sum::<f64>();
-        let beds_m: f64 = self.details.iter().map(|o| o.bed_m).sum();
+        let details_m = |r: f64| self.octaves().map(|o| o.highest_m(r)).sum::<f64>();
+        let beds_m: f64 = self.octaves().map(|o| o.bed_m).sum();
         let [abyss_m, shore_m, inland_m] = Outline::RANGE_M.map(|m| m * self.vertical);
         let sea_m = abyss_m - coasts_m - 0.2 * gullies_m - details_m(0.2) - beds_m;
         let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0) - beds_m;
@@ -354,14 +385,22 @@ fn detail_octaves(
     longest_m: f64,
     settings: &ProceduralSettings,
     next: &mut impl FnMut() -> u64,
-) -> Vec<Detail> {
+) -> Vec<Details> {
     let mut wavelength_m = longest_m;
-    let mut octaves = Vec::new();
+    let mut fours = Vec::new();
     while wavelength_m >= settings.finest_m {
-        octaves.push(Detail::new(wavelength_m, settings.relief, next()));
-        wavelength_m /= 2.5;
+        let octaves = [1.0, 2.5, 6.25, 15.625].map(|part| {
+            let octave_m = wavelength_m / part;
+            // What is finer than wanted fills up the four with nothing.
+            let relief = if octave_m >= settings.finest_m { settings.relief } else { 0.0 };
+            Detail::new(octave_m, relief, next())
+        });
+        let lattices = Lattices::new(octaves.map(|o| o.lattice));
+        let long = octaves[3].wavelength_m > LONG_M;
+        fours.push(Details { lattices, octaves, long });
+        wavelength_m /= 39.0625;
     }
-    octaves
+    fours
 }
 
 impl Detail {
@@ -372,7 +411,7 @@ impl Detail {
         // Plains roll gently; at arm's length even they have stones and tufts.
         let hilly = 1.0 - ramp(250.0, 2500.0, wavelength_m);
         let stony = 1.0 - ramp(1.0, 8.0, wavelength_m);
-        let plain = 0.0018 + 0.0075 * hilly + 0.009 * stony;
+        let plain = 0.0018 + 0.0105 * hilly + 0.007 * stony;
         let per_m = 0.035 * (1.0 - 0.75 * long) * (1.0 - 0.5 * short);
         let scale = relief * wavelength_m;
         let between = |low: f64, high: f64| (low..high).contains(&wavelength_m);
@@ -381,7 +420,7 @@ impl Detail {
             wavelength_m,
             fixed_m: plain * scale,
             rugged_m: per_m * scale,
-            knoll_m: if between(40.0, LONG_M) { 0.05 * scale } else { 0.0 },
+            knoll_m: if between(40.0, LONG_M) { 0.08 * scale } else { 0.0 },
             bed_m: if between(60.0, LONG_M) { 0.010 * scale } else { 0.0 },
         }
     }

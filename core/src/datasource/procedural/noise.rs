@@ -89,10 +89,68 @@ struct Corners {
 
 /// The cell around a point: offsets from its first corner, sum of that corner's coordinates and
 /// seed, and which of the cell's simplices holds the point.
-struct Cell {
+#[derive(Clone, Copy)]
+pub(super) struct Cell {
     at: [f64; 3],
     base: u64,
     order: usize,
+}
+
+/// Several lattices side by side, so that one instruction serves two of them.
+pub(super) struct Lattices<const N: usize> {
+    rows: [[[f64; N]; 3]; 3],
+    offset: [[f64; N]; 3],
+    seed: [u64; N],
+}
+
+impl<const N: usize> Lattices<N> {
+    pub(super) fn new(each: [Lattice; N]) -> Lattices<N> {
+        Lattices {
+            rows: [0, 1, 2].map(|row| [0, 1, 2].map(|axis| each.map(|l| l.rows[row][axis]))),
+            offset: [0, 1, 2].map(|axis| each.map(|l| l.offset[axis])),
+            seed: each.map(|l| l.seed),
+        }
+    }
+
+    /// The cell of every lattice around a point, same bits as [`Lattice::cell`].
+    #[inline(always)]
+    pub(super) fn cells(&self, at_m: DVec3) -> [Cell; N] {
+        // Plain loops: closures over arrays are not always inlined, which costs a fifth.
+        let mut cells = [Cell { at: [0.0; 3], base: 0, order: 0 }; N];
+        let mut at = [[0.0; 3]; N];
+        for (axis, (rows, offset)) in self.rows.iter().zip(&self.offset).enumerate() {
+            for k in 0..N {
+                let along = rows[0][k] * at_m.x + rows[1][k] * at_m.y + rows[2][k] * at_m.z;
+                at[k][axis] = along + offset[k];
+            }
+        }
+        for k in 0..N {
+            cells[k] = cell(at[k], self.seed[k]);
+        }
+        cells
+    }
+
+    /// [`Cell::fine_value`] of every lattice at a point.
+    #[inline(always)]
+    pub(super) fn fine_values(&self, at_m: DVec3) -> [f64; N] {
+        let cells = self.cells(at_m);
+        let mut values = [0.0; N];
+        for k in 0..N {
+            values[k] = cells[k].fine_value();
+        }
+        values
+    }
+
+    /// [`Cell::narrow_value`] of every lattice at a point.
+    #[inline(always)]
+    pub(super) fn narrow_values(&self, at_m: DVec3) -> [f64; N] {
+        let cells = self.cells(at_m);
+        let mut values = [0.0; N];
+        for k in 0..N {
+            values[k] = cells[k].narrow_value();
+        }
+        values
+    }
 }
 
 /// One of the six simplices of a cell: what to add to a point's offset to see it from each corner,
@@ -167,56 +225,14 @@ impl Lattice {
     /// Smooth noise at a point in metres; within [`PEAK`], 0 on average.
     #[inline(always)]
     pub(super) fn value(&self, at_m: DVec3) -> f64 {
-        let c = self.corners(at_m);
-        let mut sum = 0.0;
-        for i in 0..4 {
-            let g = gradient(c.hash[i]);
-            let t = kernel(&c, i);
-            let t2 = t * t;
-            sum += t2 * t2 * (g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i]);
-        }
-        SCALE * sum
-    }
-
-    /// [`Lattice::value`] within 1e-6, for short waves: the cell is found in f64, the rest is f32,
-    /// four corners at a time.
-    #[inline(always)]
-    pub(super) fn fine_value(&self, at_m: DVec3) -> f64 {
-        let Cell { at, base, order } = self.cell(at_m);
-        let simplex = &SIMPLICES[order];
-        let [ox, oy, oz] = &simplex.narrow;
-        let [x, y, z] = at.map(narrow);
-        let g = simplex.steps.map(|step| &GRADIENTS_F32[slot(mix(base.wrapping_add(step)))]);
-        let mut parts = [0.0_f32; 4];
-        for i in 0..4 {
-            let (dx, dy, dz) = (x + ox[i], y + oy[i], z + oz[i]);
-            let t = 0.5 - dx * dx - dy * dy - dz * dz;
-            let t = if t > 0.0 { t } else { 0.0 };
-            let t2 = t * t;
-            parts[i] = t2 * t2 * (g[i][0] * dx + g[i][1] * dy + g[i][2] * dz);
-        }
-        SCALE * f64::from((parts[0] + parts[1]) + (parts[2] + parts[3]))
+        self.cell(at_m).value()
     }
 
     /// [`Lattice::value`] and its gradient per metre.
     #[inline(always)]
     pub(super) fn value_and_gradient(&self, at_m: DVec3) -> (f64, DVec3) {
-        let c = self.corners(at_m);
-        let mut sum = 0.0;
-        let mut slope = DVec3::ZERO;
-        for i in 0..4 {
-            let g = gradient(c.hash[i]);
-            let t = kernel(&c, i);
-            let t2 = t * t;
-            let dot = g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i];
-            let fall = -8.0 * t2 * t * dot;
-            let t4 = t2 * t2;
-            sum += t4 * dot;
-            slope.x += t4 * g[0] + fall * c.dx[i];
-            slope.y += t4 * g[1] + fall * c.dy[i];
-            slope.z += t4 * g[2] + fall * c.dz[i];
-        }
-        (SCALE * sum, self.per_metre(slope * SCALE))
+        let (value, slope) = self.cell(at_m).value_and_gradient();
+        (value, self.per_metre(slope))
     }
 
     /// Stripes that run across `side` (a vector of length 0..1 in the axes of `at_m`): -1..1, and
@@ -224,7 +240,7 @@ impl Lattice {
     /// per blot. Random phases sit on the lattice, so stripes fork and join.
     #[inline(always)]
     pub(super) fn stripes(&self, at_m: DVec3, side: DVec3) -> (f64, DVec3) {
-        let c = self.corners(at_m);
+        let c = self.cell(at_m).corners();
         let across =
             DVec3::new(self.rows[0].dot(side), self.rows[1].dot(side), self.rows[2].dot(side));
         let turns_per_offset = TURNS_PER_CELL / self.cells_per_m;
@@ -243,45 +259,117 @@ impl Lattice {
         (sum * inverse, side * (slope * inverse * per_m))
     }
 
+    /// A gradient per metre, from one in the lattice's own units.
     #[inline]
-    fn per_metre(&self, slope: DVec3) -> DVec3 {
+    pub(super) fn per_metre(&self, slope: DVec3) -> DVec3 {
         self.rows[0] * slope.x + self.rows[1] * slope.y + self.rows[2] * slope.z
     }
 
     #[inline(always)]
-    fn cell(&self, at_m: DVec3) -> Cell {
-        const THIRD: f64 = 1.0 / 3.0;
-        let x = self.rows[0].dot(at_m) + self.offset.x;
-        let y = self.rows[1].dot(at_m) + self.offset.y;
-        let z = self.rows[2].dot(at_m) + self.offset.z;
-        let skew = (x + y + z) * THIRD - 0.5;
-        let (bx, by, bz) = (x + skew + ROUND, y + skew + ROUND, z + skew + ROUND);
-        let (fx, fy, fz) = (bx - ROUND, by - ROUND, bz - ROUND);
-        let unskew = (fx + fy + fz) * SIXTH;
-        let (x0, y0, z0) = (x - fx + unskew, y - fy + unskew, z - fz + unskew);
-        let order =
-            usize::from(x0 >= y0) | usize::from(y0 >= z0) << 1 | usize::from(x0 >= z0) << 2;
-        let base = bx
-            .to_bits()
-            .wrapping_mul(PRIME_X)
-            .wrapping_add(by.to_bits().wrapping_mul(PRIME_Y))
-            .wrapping_add(bz.to_bits().wrapping_mul(PRIME_Z))
-            .wrapping_add(self.seed);
-        Cell { at: [x0, y0, z0], base, order }
+    pub(super) fn cell(&self, at_m: DVec3) -> Cell {
+        let along = |row: DVec3| row.x * at_m.x + row.y * at_m.y + row.z * at_m.z;
+        let [x, y, z] = self.rows.map(along);
+        cell([x + self.offset.x, y + self.offset.y, z + self.offset.z], self.seed)
+    }
+}
+
+impl Cell {
+    /// Noise at the cell's point; see [`Lattice::value`].
+    #[inline(always)]
+    pub(super) fn value(&self) -> f64 {
+        let c = self.corners();
+        let mut sum = 0.0;
+        for i in 0..4 {
+            let g = gradient(c.hash[i]);
+            let t = kernel(&c, i);
+            let t2 = t * t;
+            sum += t2 * t2 * (g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i]);
+        }
+        SCALE * sum
+    }
+
+    /// [`Cell::value`] and its gradient in the lattice's own units.
+    #[inline(always)]
+    pub(super) fn value_and_gradient(&self) -> (f64, DVec3) {
+        let c = self.corners();
+        let mut sum = 0.0;
+        let mut slope = DVec3::ZERO;
+        for i in 0..4 {
+            let g = gradient(c.hash[i]);
+            let t = kernel(&c, i);
+            let t2 = t * t;
+            let dot = g[0] * c.dx[i] + g[1] * c.dy[i] + g[2] * c.dz[i];
+            let fall = -8.0 * t2 * t * dot;
+            let t4 = t2 * t2;
+            sum += t4 * dot;
+            slope.x += t4 * g[0] + fall * c.dx[i];
+            slope.y += t4 * g[1] + fall * c.dy[i];
+            slope.z += t4 * g[2] + fall * c.dz[i];
+        }
+        (SCALE * sum, slope * SCALE)
+    }
+
+    /// [`Cell::value`] within 1e-6, where that does not matter: f32, four corners at a time.
+    #[inline(always)]
+    pub(super) fn narrow_value(&self) -> f64 {
+        self.narrow_with(mix)
+    }
+
+    /// As precise and faster, but another noise of the same kind.
+    #[inline(always)]
+    pub(super) fn fine_value(&self) -> f64 {
+        self.narrow_with(half_mix)
     }
 
     #[inline(always)]
-    fn corners(&self, at_m: DVec3) -> Corners {
-        let Cell { at: [x, y, z], base, order } = self.cell(at_m);
-        let simplex = &SIMPLICES[order];
+    fn narrow_with(&self, scramble: impl Fn(u64) -> u64) -> f64 {
+        let simplex = &SIMPLICES[self.order];
+        let [ox, oy, oz] = &simplex.narrow;
+        let [x, y, z] = self.at.map(narrow);
+        let slots = simplex.steps.map(|step| slot(scramble(self.base.wrapping_add(step))));
+        let g = slots.map(|slot| &GRADIENTS_F32[slot]);
+        let mut parts = [0.0_f32; 4];
+        for i in 0..4 {
+            let (dx, dy, dz) = (x + ox[i], y + oy[i], z + oz[i]);
+            let t = 0.5 - dx * dx - dy * dy - dz * dz;
+            let t = if t > 0.0 { t } else { 0.0 };
+            let t2 = t * t;
+            parts[i] = t2 * t2 * (g[i][0] * dx + g[i][1] * dy + g[i][2] * dz);
+        }
+        SCALE * f64::from((parts[0] + parts[1]) + (parts[2] + parts[3]))
+    }
+
+    #[inline(always)]
+    fn corners(&self) -> Corners {
+        let [x, y, z] = self.at;
+        let simplex = &SIMPLICES[self.order];
         let [ox, oy, oz] = &simplex.offsets;
         Corners {
             dx: ox.map(|o| x + o),
             dy: oy.map(|o| y + o),
             dz: oz.map(|o| z + o),
-            hash: simplex.steps.map(|step| mix(base.wrapping_add(step))),
+            hash: simplex.steps.map(|step| mix(self.base.wrapping_add(step))),
         }
     }
+}
+
+/// The cell around a point in a lattice's own units.
+#[inline(always)]
+fn cell([x, y, z]: [f64; 3], seed: u64) -> Cell {
+    const THIRD: f64 = 1.0 / 3.0;
+    let skew = (x + y + z) * THIRD - 0.5;
+    let (bx, by, bz) = (x + skew + ROUND, y + skew + ROUND, z + skew + ROUND);
+    let (fx, fy, fz) = (bx - ROUND, by - ROUND, bz - ROUND);
+    let unskew = (fx + fy + fz) * SIXTH;
+    let (x0, y0, z0) = (x - fx + unskew, y - fy + unskew, z - fz + unskew);
+    let order = usize::from(x0 >= y0) | (usize::from(y0 >= z0) << 1) | (usize::from(x0 >= z0) << 2);
+    let base = bx
+        .to_bits()
+        .wrapping_mul(PRIME_X)
+        .wrapping_add(by.to_bits().wrapping_mul(PRIME_Y))
+        .wrapping_add(bz.to_bits().wrapping_mul(PRIME_Z))
+        .wrapping_add(seed);
+    Cell { at: [x0, y0, z0], base, order }
 }
 
 /// Turns of a stripe phase per cell of its lattice, for a `side` of length 1.
@@ -292,6 +380,12 @@ const TURNS_PER_CELL: f64 = 1.0;
 pub(super) fn mix(bits: u64) -> u64 {
     let a = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     (a ^ (a >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB)
+}
+
+/// Scrambles the top bits well enough to pick a gradient.
+#[inline]
+fn half_mix(bits: u64) -> u64 {
+    (bits ^ (bits >> 32)).wrapping_mul(0xBF58_476D_1CE4_E5B9)
 }
 
 /// The top 52 bits of a hash as a number in 0..1.

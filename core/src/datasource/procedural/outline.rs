@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::noise::{Lattice, mix, ramp, unit};
+use super::noise::{Cell, Lattice, Lattices, mix, ramp, unit};
 
 /// The longest waves at one point.
 pub(super) struct Shape {
@@ -22,11 +22,10 @@ pub(super) struct Shape {
 /// Continents, basins and belts.
 pub(super) struct Outline {
     warps: [(Lattice, f64); 2],
-    continents: [(Lattice, f64); 4],
-    belts: [Lattice; 2],
-    wiggle: Lattice,
-    breaks: Lattice,
-    uplands: Lattice,
+    /// The continents' octaves, then the belts.
+    lands: Lattices<6>,
+    /// What bends belts, what breaks them, and uplands.
+    marks: Lattices<3>,
     /// Continent noise at the coast, and how much of it one unit of [`Outline::inland`] is.
     coast: f64,
     spread: f64,
@@ -52,16 +51,10 @@ impl Outline {
                 (lattice(6000.0), 0.055 * 36.0 * square),
                 (lattice(1900.0), 0.035 * 3.6 * square),
             ],
-            continents: [
-                (lattice(9500.0), 1.0),
-                (lattice(4700.0), 0.62),
-                (lattice(2300.0), 0.34),
-                (lattice(1150.0), 0.17),
-            ],
-            belts: [lattice(5200.0), lattice(3300.0)],
-            wiggle: lattice(1300.0),
-            breaks: lattice(2400.0),
-            uplands: lattice(1500.0),
+            lands: Lattices::new(
+                [9500.0, 4700.0, 2300.0, 1150.0, 5200.0, 3300.0].map(&mut lattice),
+            ),
+            marks: Lattices::new([1300.0, 2400.0, 1500.0].map(&mut lattice)),
             coast: 0.0,
             spread: 1.0,
         };
@@ -75,19 +68,19 @@ impl Outline {
 
     pub(super) fn at(&self, at_m: DVec3, n: DVec3) -> Shape {
         let warped_m = self.warped(at_m, n);
-        let inland = (self.continent(warped_m) - self.coast) / self.spread;
-        let wiggle = 0.16 * self.wiggle.value(at_m);
-        let breaks = self.breaks.value(at_m);
+        let lands = self.lands.cells(warped_m);
+        let inland = (continent(&lands) - self.coast) / self.spread;
+        let [wiggle, breaks, uplands] = self.marks.cells(at_m);
+        let (wiggle, breaks) = (0.16 * wiggle.value(), breaks.value());
         let land = ramp(-0.03, 0.10, inland);
         // What would be multiplied by zero is left out: most of the planet lies under water.
         let share = 0.35 + 0.65 * ramp(-0.35, 0.15, breaks);
-        let young = share * self.belt(0, warped_m, wiggle, 0.12 + 0.06 * breaks);
+        let young = share * belt(lands[4].value() + wiggle, 0.12 + 0.06 * breaks);
         let share = if land > 0.0 { ramp(0.25, -0.35, breaks) } else { 0.0 };
-        let old = if share > 0.0 { share * self.belt(1, warped_m, wiggle, 0.09) } else { 0.0 };
+        let old = if share > 0.0 { share * belt(lands[5].value() + wiggle, 0.09) } else { 0.0 };
         let belts = 1.0 - (1.0 - young) * (1.0 - 0.5 * old);
         let mountain = belts * land;
-        let upland =
-            if land > 0.0 { ramp(0.0, 0.6, self.uplands.value(at_m)) } else { 0.0 };
+        let upland = if land > 0.0 { ramp(0.0, 0.6, uplands.narrow_value()) } else { 0.0 };
         let plain = 0.03 + land * (0.03 + 0.16 * upland);
         let rise = young * (1.0 - land);
         let ruggedness = plain + (1.0 - plain) * mountain + 0.12 * rise;
@@ -99,13 +92,6 @@ impl Outline {
         Shape { base_m, mountain, ruggedness }
     }
 
-    /// A belt follows a zero of noise: 1 on it, 0 from `width` on, level at both.
-    fn belt(&self, which: usize, at_m: DVec3, wiggle: f64, width: f64) -> f64 {
-        let off = (self.belts[which].value(at_m) + wiggle) / width;
-        let inside = 1.0 - off * off;
-        if inside > 0.0 { inside * inside } else { 0.0 }
-    }
-
     /// Swirls along the surface bend coasts and belts out of the roundness of plain noise.
     fn warped(&self, at_m: DVec3, n: DVec3) -> DVec3 {
         let mut warped_m = at_m;
@@ -114,10 +100,6 @@ impl Outline {
             warped_m += (n.cross(gradient) + gradient * 0.5) * *reach_m2;
         }
         warped_m
-    }
-
-    fn continent(&self, warped_m: DVec3) -> f64 {
-        self.continents.iter().map(|(lattice, weight)| lattice.value(warped_m) * weight).sum()
     }
 
     /// Continent noise at one of many random points, to find the level that floods its share.
@@ -131,8 +113,27 @@ impl Outline {
             let v = DVec3::new(next(), next(), next());
             if (0.01..=1.0).contains(&v.length_squared()) {
                 let n = v.normalize();
-                return self.continent(self.warped(n * radius_m, n));
+                return continent(&self.lands.cells(self.warped(n * radius_m, n)));
             }
         }
     }
+}
+
+/// Weights of the continents' octaves.
+const CONTINENTS: [f64; 4] = [1.0, 0.62, 0.34, 0.17];
+
+#[inline(always)]
+fn continent(lands: &[Cell; 6]) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..4 {
+        sum += CONTINENTS[i] * lands[i].value();
+    }
+    sum
+}
+
+/// A belt follows a zero of noise: 1 on it, 0 from `width` on, level at both.
+fn belt(noise: f64, width: f64) -> f64 {
+    let off = noise / width;
+    let inside = 1.0 - off * off;
+    if inside > 0.0 { inside * inside } else { 0.0 }
 }

@@ -1,0 +1,112 @@
+//! The bounds that priorities are made of, held against the ground itself.
+//!
+//! In:    settled meshes over the procedural planets; points inside their triangles.
+//! Out:   passes or fails.
+//! Keeps: nothing.
+//! Not here: bounds on the screen, several frames.
+
+mod rig;
+
+use glam::DVec3;
+use overfly_core::datasource::procedural::Style;
+use overfly_core::digest::mix;
+use overfly_core::geodesy::{Ecef, Ellipsoid, Geodetic};
+use overfly_core::lod::audit::lattice_points;
+use overfly_core::lod::reach::page_is_finest;
+use overfly_core::mesh::patches::PatchVertex;
+use overfly_core::mesh::topology::indices;
+use overfly_core::settings::SourceSettings;
+use rig::{Rig, scene, view};
+
+/// A number in [0, 1) that looks random.
+fn unit(seed: u64) -> f64 {
+    (mix(seed) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A random point of one of a patch's small triangles.
+fn point_of(vertices: &[PatchVertex], pattern: &[u32], seed: u64) -> DVec3 {
+    let triangles = pattern.len() as u64 / 3;
+    let triangle = usize::try_from(mix(seed ^ 7) % triangles).unwrap() * 3;
+    let corner = |i: usize| {
+        let position = vertices[pattern[triangle + i] as usize].position;
+        let axis = |a: usize| f64::from(position.hi[a]) + f64::from(position.lo[a]);
+        DVec3::new(axis(0), axis(1), axis(2))
+    };
+    let (a, b) = (unit(seed ^ 1).sqrt(), unit(seed ^ 2));
+    corner(0) * (1.0 - a) + corner(1) * (a * (1.0 - b)) + corner(2) * (a * b)
+}
+
+/// Worst ratio of true error over stated bound at random points of every leaf, and their number.
+fn worst_ratio(rig: &Rig, body: &Ellipsoid, sea: bool) -> (f64, u32) {
+    let (lod, patches) = (rig.terrain.lod(), rig.terrain.patches());
+    let pattern = indices(patches.patch_depth);
+    let (mut worst, mut points) = (0.0_f64, 0);
+    let leaves = lod.diamonds.ids().flat_map(|id| {
+        let node = &lod.diamonds.node[id];
+        let bounded = page_is_finest(node.shape.level, patches.patch_depth);
+        node.patches.into_iter().flatten().filter(move |_| bounded).map(move |slot| (id, slot))
+    });
+    for (id, slot) in leaves.flat_map(|leaf| [leaf, leaf]) {
+        let (node, region) = (&lod.diamonds.node[id], &lod.diamonds.region[id]);
+        let seed = node.key ^ u64::from(slot) << 40 ^ points;
+        let there =
+            body.geodetic_from_ecef(Ecef(point_of(patches.vertices_of(slot), &pattern, seed)));
+        let ground_m = rig.generator.planet().sample(there.normal()).height_m;
+        let ground_m = if sea { ground_m.max(0.0) } else { ground_m };
+        worst = worst.max((there.height_m - ground_m).abs() / region.error_m);
+        points += 1;
+        let [low_m, high_m] = [region.low_m - 1e-3, region.high_m + 1e-3];
+        let inside = (low_m..=high_m).contains(&ground_m);
+        assert!(inside, "{ground_m} m outside {low_m}..{high_m} m, level {}", node.shape.level);
+    }
+    (worst, u32::try_from(points).unwrap())
+}
+
+#[test]
+fn no_triangle_is_farther_from_the_ground_than_its_bound() {
+    let kinds = [(Style::Earthlike, true), (Style::Cratered, false)];
+    for ((style, sea), patch_depth) in kinds.into_iter().flat_map(|kind| [(kind, 0), (kind, 4)]) {
+        let mut settings = scene(patch_depth, 60_000);
+        settings.sea = sea;
+        let (seed, relief, finest_m) = (2029, 1.0, 0.2);
+        settings.sources = vec![SourceSettings::Procedural { seed, style, relief, finest_m }];
+        let body = settings.body;
+        let mut rig = Rig::new(&settings, 1);
+        let mut worst = 0.0_f64;
+        for (lat, lon, height_m) in
+            [(46.8, -121.8, 2_900.0), (46.8, -121.8, 300_000.0), (20.0, -95.0, 30_000.0)]
+        {
+            let at = Geodetic::from_degrees(lat, lon, height_m);
+            rig.settle(&[view(&body, at, 30.0, -35.0)]);
+            let (ratio, points) = worst_ratio(&rig, &body, sea);
+            assert!(points > 3_000, "{points}");
+            worst = worst.max(ratio);
+        }
+        println!("{style:?}, k = {patch_depth}: error at most {worst:.3} of its bound");
+        assert!(worst <= 1.0, "{style:?}, k = {patch_depth}: {worst}");
+        assert!(worst > 0.05, "a bound twenty times too large is no bound: {worst}");
+    }
+}
+
+#[test]
+fn patches_hold_the_heights_of_their_lattice_points() {
+    let mut rig = Rig::new(&scene(4, 30_000), 0);
+    let body = Ellipsoid::WGS84;
+    rig.settle(&[view(&body, Geodetic::from_degrees(46.8, -121.8, 3_000.0), 30.0, -35.0)]);
+    let (lod, patches) = (rig.terrain.lod(), rig.terrain.patches());
+    let mut checked = 0;
+    for id in lod.diamonds.ids() {
+        let node = &lod.diamonds.node[id];
+        for side in 0..2 {
+            let Some(slot) = node.patches[side] else { continue };
+            let points = lattice_points(node.shape.triangle(side), 4);
+            for (point, vertex) in points.into_iter().zip(patches.vertices_of(slot)).step_by(7) {
+                let normal = overfly_core::lattice::normal_of(point);
+                let height_m = rig.generator.planet().sample(normal).height_m;
+                assert!((f64::from(vertex.height_m) - height_m).abs() < 1e-3);
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 1_000);
+}
