@@ -38,8 +38,8 @@ const SHELF: vec3<f32> = vec3<f32>(0.008, 0.042, 0.066);
 const DEEP: vec3<f32> = vec3<f32>(0.0022, 0.0095, 0.0280);
 const SHELF_M: f32 = 25.0;                            // depth at which shallow colours fade
 const DEEP_M: f32 = 900.0;                            // depth at which the shelf's colours fade
-const WAVES: f32 = 0.13;                              // slope of the waves: width of the glint
-const GLINT: f32 = 0.9;
+const WAVES: f32 = 0.17;                              // slope of the waves: width of the glint
+const GLINT: f32 = 0.22;
 const REFLECTED_SKY: vec3<f32> = vec3<f32>(0.030, 0.044, 0.062); // per SUN_LIGHT
 
 // ---- Light without a sun or without air ----

@@ -179,7 +179,7 @@ fn the_same_draws_give_the_same_bits_and_nothing_to_upload() {
 
 #[test]
 fn more_patches_than_the_staging_buffer_holds_arrive_all() {
-    // Fifteen vertices of 40 bytes: 4 MiB hold 6990 patches of 8192.
+    // Fifteen vertices of 36 bytes: 4 MiB hold 7767 patches of 8192.
     let large = RendererSettings { patches_max: 8 << 10, ..settings(false) };
     if renderer(false).is_none() {
         return;

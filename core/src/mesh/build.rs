@@ -112,7 +112,6 @@ fn vertex_at(page: &Page, point: IVec3, ecef: DVec3) -> PatchVertex {
         normal_oct: page.normals[at],
         layers: page.layers[at],
         height_m: page.heights_m[at],
-        reserved: 0.0,
     }
 }
 

@@ -8,7 +8,7 @@
 use crate::geodesy::TwoFloat;
 use glam::DVec3;
 
-/// One vertex as it is uploaded: 40 bytes.
+/// One vertex as it is uploaded: 36 bytes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(C)]
 pub struct PatchVertex {
@@ -21,11 +21,9 @@ pub struct PatchVertex {
     /// Height of the ground above the ellipsoid in metres; below 0 under a sea, although the
     /// position is on the water.
     pub height_m: f32,
-    /// Morph target and other later uses; zero.
-    pub reserved: f32,
 }
 
-const _: () = assert!(size_of::<PatchVertex>() == 40);
+const _: () = assert!(size_of::<PatchVertex>() == 36);
 
 impl PatchVertex {
     /// A vertex of an empty slot.
@@ -34,7 +32,6 @@ impl PatchVertex {
         normal_oct: [0; 2],
         layers: [0; 4],
         height_m: 0.0,
-        reserved: 0.0,
     };
 }
 

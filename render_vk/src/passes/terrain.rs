@@ -22,7 +22,7 @@ pub(crate) fn pipeline(
     layout: &Layout,
     targets: &Targets,
 ) -> Result<Pipeline, Fault> {
-    let stride = u32::try_from(size_of::<PatchVertex>()).expect("a vertex is 40 bytes");
+    let stride = u32::try_from(size_of::<PatchVertex>()).expect("a vertex is 36 bytes");
     let bindings = [vk::VertexInputBindingDescription::default()
         .stride(stride)
         .input_rate(vk::VertexInputRate::VERTEX)];
@@ -53,6 +53,6 @@ fn attribute(
     format: vk::Format,
     offset: usize,
 ) -> vk::VertexInputAttributeDescription {
-    let offset = u32::try_from(offset).expect("a vertex is 40 bytes");
+    let offset = u32::try_from(offset).expect("a vertex is 36 bytes");
     vk::VertexInputAttributeDescription { location, binding: 0, format, offset }
 }

@@ -91,7 +91,6 @@ fn vertex(at: IVec3, hills_m: f64) -> PatchVertex {
         normal_oct: oct(slope),
         layers: [byte(0.5), byte(rocky), byte(wet), byte((celsius + 40.0) / 80.0)],
         height_m: narrow(height),
-        reserved: 0.0,
     }
 }
 

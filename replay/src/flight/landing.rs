@@ -19,10 +19,11 @@ const SIDES: u32 = 12;
 const ROLL_POINTS: u32 = 16;
 /// Metres of relief that a metre of roughness of the roll outweighs.
 const ROUGH: f64 = 300.0;
-/// Latitude and longitude of the middle of the search: where the presets' sun stands high.
-const MIDDLE_DEG: [f64; 2] = [30.0, -100.0];
-/// The search covers normals within this of the middle's, as 1 − cosine: some 37° around it.
-const CAP: f64 = 0.2;
+/// Latitude and longitude of the middle of the search: where the presets' sun stands low and
+/// gives relief.
+const MIDDLE_DEG: [f64; 2] = [42.0, -122.0];
+/// The search covers normals within this of the middle's, as 1 − cosine: 20° around it.
+const CAP: f64 = 0.06;
 /// The golden angle, in radians.
 const GOLDEN: f64 = 2.399_963_229_728_653;
 
