@@ -154,7 +154,7 @@ fn sources<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Vec<SourceS
 }
 
 fn source<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<SourceSettings> {
-    let seed = reader.whole(source, "seed", 0..=u64::MAX, 1);
+    let seed = reader.whole(source, "seed", 0..=u64::MAX, 2029);
     let style = style(reader, source);
     let relief = reader.number(source, "relief", 0.0..=10.0, 1.0);
     let finest_m = reader.number(source, "finest_m", 0.01..=1000.0, 0.15);

@@ -45,7 +45,7 @@ enum RawBody {
 #[serde(deny_unknown_fields)]
 enum RawSource {
     Procedural {
-        #[serde(default = "one")]
+        #[serde(default = "seed")]
         seed: i64,
         #[serde(default = "earthlike")]
         style: RawStyle,
@@ -103,8 +103,8 @@ struct RawMemory {
     pages_mib: i64,
 }
 
-fn one() -> i64 {
-    1
+fn seed() -> i64 {
+    2029
 }
 
 fn one_f64() -> f64 {
@@ -120,7 +120,7 @@ fn earthlike() -> RawStyle {
 }
 
 fn one_source() -> Vec<RawSource> {
-    let (seed, relief, finest_m) = (one(), one_f64(), finest_m());
+    let (seed, relief, finest_m) = (seed(), one_f64(), finest_m());
     vec![RawSource::Procedural { seed, style: earthlike(), relief, finest_m }]
 }
 

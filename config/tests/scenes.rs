@@ -44,7 +44,7 @@ fn earth_resolves_to_what_it_says() {
     let earth = load("earth").unwrap();
     assert_eq!(earth.body, Ellipsoid::WGS84);
     let SourceSettings::Procedural { seed, style, relief, finest_m } = earth.sources[0];
-    assert_eq!((seed, style, relief, finest_m), (1, Style::Earthlike, 1.0, 0.15));
+    assert_eq!((seed, style, relief, finest_m), (2029, Style::Earthlike, 1.0, 0.15));
     assert_eq!(earth.sources.len(), 1);
     assert_eq!((earth.lod.tolerance.0, earth.lod.triangles_max), (1.0, 100_000));
     assert_eq!((earth.lod.patch_depth, earth.lod.level_max), (4, 50));
@@ -59,7 +59,7 @@ fn earth_resolves_to_what_it_says() {
     assert!(earth.sea);
     let sun = earth.sun.unwrap().direction;
     assert!((sun.length() - 1.0).abs() < 1e-15);
-    assert!(sun.x > 0.0 && sun.y < 0.0 && (sun.z - 0.173_648).abs() < 1e-6);
+    assert!(sun.x < 0.0 && sun.y > 0.0 && (sun.z - 0.173_648).abs() < 1e-6);
 }
 
 #[test]

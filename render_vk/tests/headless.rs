@@ -165,7 +165,7 @@ fn the_same_draws_give_the_same_bits_and_nothing_to_upload() {
     let first = renderer.draw(&view, &patches, &earth(), &team).unwrap();
     let picture = renderer.read_pixels().unwrap();
     assert_eq!(first.uploaded_patches, 8 << 8);
-    assert_eq!(first.uploaded_bytes, u64::from(first.uploaded_patches) * 15 * 40);
+    assert_eq!(first.uploaded_bytes, u64::from(first.uploaded_patches) * 15 * 36);
     assert_eq!((first.draws, first.triangles), (2 * (8 << 8), 2 * (8 << 12)));
     assert_eq!(first.secondaries, 2 * 8 + 1);
     for _ in 0..3 {

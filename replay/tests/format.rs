@@ -24,7 +24,7 @@ use std::fs;
 use std::path::Path;
 
 /// Bytes before the first frame of the tiny recording.
-const TINY_HEADER: usize = 12 + 9 + 59;
+const TINY_HEADER: usize = 12 + 9 + 77;
 
 fn scene() -> SceneSettings {
     SceneSettings {
