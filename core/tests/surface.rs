@@ -83,6 +83,22 @@ fn no_frame_spends_more_operations_than_its_counts_allow() {
 }
 
 #[test]
+fn the_deepest_level_is_kept_and_its_error_is_told() {
+    for level_max in [0, 1, 9, 20] {
+        let mut settings = scene(2, 50_000);
+        settings.lod.level_max = level_max;
+        let mut rig = Rig::new(&settings, 0);
+        rig.settle(&[view(&EARTH, at(46.8, -121.8, 3_000.0), 0.0, -30.0)]);
+        rig.audit();
+        let lod = rig.terrain.lod();
+        let leaves = lod.diamonds.ids().map(|id| lod.diamonds.node[id]);
+        let deepest = leaves.filter(|node| node.patches != [None; 2]).map(|node| node.shape.level);
+        assert_eq!(deepest.max(), Some(level_max));
+        assert!(rig.output.counts.error_px_bound > settings.lod.tolerance.0);
+    }
+}
+
+#[test]
 fn several_views_refine_for_each_of_them() {
     let mut settings = scene(4, 400_000);
     settings.lod.tolerance.0 = 100.0;

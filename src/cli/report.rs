@@ -41,7 +41,10 @@ pub fn table(columns: &Columns) -> String {
     for (name, column) in columns.counts.iter().filter(|(name, _)| SHOWN.contains(name)) {
         if let Some(s) = Summary::of_numbers(column) {
             let digits = if *name == "error_px_bound" { 2 } else { 0 };
-            let cell = |value: f64| format!("{value:.digits$}");
+            let cell = |value: f64| match value {
+                large if large >= 1e7 => format!("{large:.2e}"),
+                value => format!("{value:.digits$}"),
+            };
             line(&mut text, name, [s.p50, s.p95, s.p99, s.max].map(cell));
         }
     }

@@ -89,7 +89,7 @@ pub struct FrameCounts {
     /// Patches drawn, summed over views and depth ranges.
     pub drawn: u32,
     /// Error bound on the screen of the worst leaf, in pixels; above the tolerance where the
-    /// budget, the operation cap or missing pages ended the refinement.
+    /// budget, the operation cap, the deepest level or missing pages ended the refinement.
     pub error_px_bound: f64,
 }
 

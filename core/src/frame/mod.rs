@@ -40,7 +40,7 @@ const PLACE: Span = Span("mesh.place");
 pub struct Lod {
     /// Every diamond with a record.
     pub diamonds: Diamonds,
-    /// Split, merge and blocked queue.
+    /// Their queues.
     pub queues: Queues,
     scratch: Scratch,
 }

@@ -47,7 +47,7 @@ pub struct TwoFloat {
 
 /// The only place where f64 becomes f32. Error: half an f32 ulp.
 #[expect(clippy::cast_possible_truncation, reason = "this is the one named narrowing")]
-pub fn narrow(x: f64) -> f32 {
+pub const fn narrow(x: f64) -> f32 {
     x as f32
 }
 

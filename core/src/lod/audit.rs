@@ -37,7 +37,7 @@ pub fn consistent(
         *place = true;
     }
     let mut users: BTreeMap<u32, u32> = BTreeMap::new();
-    let (mut leaves, mut queued) = (0, [0, 0, 0]);
+    let (mut leaves, mut queued) = (0, [0; 4]);
     for id in diamonds.ids() {
         let node = &diamonds.node[id];
         if is_free[id.index() as usize] {
@@ -94,19 +94,20 @@ fn membership(
     queues: &Queues,
     id: DiamondId,
     node: &Node,
-    queued: &mut [u32; 3],
+    queued: &mut [u32; 4],
 ) -> Result<(), String> {
     let queue = queues.link[id].queue;
     let fits = match queue {
-        Queue::Split | Queue::Blocked => !node.split,
+        Queue::Split | Queue::Blocked | Queue::Deepest => !node.split,
         Queue::Merge => node.split && node.split_kids == 0,
-        Queue::None => !node.split || node.split_kids > 0,
+        Queue::None => node.split && node.split_kids > 0,
     };
     ensure(fits, || format!("{id:?} is in queue {queue:?}: {node:?}"))?;
     match queue {
         Queue::Split => queued[0] += 1,
         Queue::Merge => queued[1] += 1,
         Queue::Blocked => queued[2] += 1,
+        Queue::Deepest => queued[3] += 1,
         Queue::None => {}
     }
     Ok(())

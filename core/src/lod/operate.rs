@@ -64,8 +64,13 @@ impl Surface<'_> {
         for id in base {
             self.add_leaf(id, 0);
             self.add_leaf(id, 1);
-            self.enqueue(id, Queue::Split);
+            self.enqueue(id, self.queue_of_leaf(id));
         }
+    }
+
+    fn queue_of_leaf(&self, id: DiamondId) -> Queue {
+        let deepest = self.diamonds.node[id].shape.level >= self.lod.level_max;
+        if deepest { Queue::Deepest } else { Queue::Split }
     }
 
     /// Why `id` cannot be split now: the page that it or an ancestor to be forced waits for.
@@ -164,8 +169,8 @@ impl Surface<'_> {
             self.diamonds.region[kid] = self.region_of(kid);
         }
         self.add_leaf(kid, side);
-        if is_new && self.diamonds.node[kid].shape.level < self.lod.level_max {
-            self.enqueue(kid, Queue::Split);
+        if is_new {
+            self.enqueue(kid, self.queue_of_leaf(kid));
         }
     }
 

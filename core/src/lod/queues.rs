@@ -1,4 +1,4 @@
-//! The split and the merge queue: bucketed by quantised priority, linked through columns.
+//! The queues of diamonds, split and merge before all: bucketed by quantised priority, linked through columns.
 //!
 //! In:    diamonds with an exact priority and a key.
 //! Out:   the first to split, the first to merge; O(1) insert, remove and re-bucket.
@@ -21,7 +21,7 @@ const BASE: u64 = (1023 - 20) << 6;
 /// In which queue a diamond is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Queue {
-    /// In none: interior, at the deepest level, or free.
+    /// In none: interior or free.
     None,
     /// Unsplit, may be split.
     Split,
@@ -29,6 +29,8 @@ pub enum Queue {
     Merge,
     /// Unsplit, waits for a page until the next frame.
     Blocked,
+    /// Unsplit at the deepest level: here only so that its error is known.
+    Deepest,
 }
 
 /// A diamond's standing in its queue.
@@ -108,13 +110,14 @@ impl Buckets {
     }
 }
 
-/// The three queues and the links of every diamond.
+/// The four queues and the links of every diamond.
 pub struct Queues {
     /// Links by diamond.
     pub link: Column<Diamond, Link>,
     split: Buckets,
     merge: Buckets,
     blocked: Buckets,
+    deepest: Buckets,
 }
 
 impl Queues {
@@ -125,6 +128,7 @@ impl Queues {
             split: Buckets::new(),
             merge: Buckets::new(),
             blocked: Buckets::new(),
+            deepest: Buckets::new(),
         }
     }
 
@@ -133,13 +137,14 @@ impl Queues {
             Queue::Split => &mut self.split,
             Queue::Merge => &mut self.merge,
             Queue::Blocked => &mut self.blocked,
+            Queue::Deepest => &mut self.deepest,
             Queue::None => unreachable!("no buckets for diamonds in no queue"),
         }
     }
 
-    /// Diamonds in the split, merge and blocked queue.
-    pub fn lengths(&self) -> [u32; 3] {
-        [self.split.len, self.merge.len, self.blocked.len]
+    /// Diamonds in the split, merge, blocked and deepest queue.
+    pub fn lengths(&self) -> [u32; 4] {
+        [self.split.len, self.merge.len, self.blocked.len, self.deepest.len]
     }
 
     /// Puts a diamond that is in no queue into one.
@@ -195,8 +200,18 @@ impl Queues {
 
     /// The greatest of the split queue.
     pub fn first_to_split(&self, rank: impl Fn(DiamondId) -> Rank) -> Option<DiamondId> {
-        let bucket = self.split.highest_at_or_below(BUCKETS - 1)?;
-        self.best(self.split.heads[bucket], &rank, Ordering::Greater, &|_| true)
+        self.greatest(&self.split, &rank)
+    }
+
+    /// The greatest priority of all unsplit diamonds, whichever queue they are in.
+    pub fn worst_px(&self, rank: impl Fn(DiamondId) -> Rank) -> f64 {
+        let of = |buckets| self.greatest(buckets, &rank).map_or(0.0, |id| rank(id).priority_px);
+        [&self.split, &self.blocked, &self.deepest].map(of).into_iter().fold(0.0, f64::max)
+    }
+
+    fn greatest(&self, buckets: &Buckets, rank: &impl Fn(DiamondId) -> Rank) -> Option<DiamondId> {
+        let bucket = buckets.highest_at_or_below(BUCKETS - 1)?;
+        self.best(buckets.heads[bucket], rank, Ordering::Greater, &|_| true)
     }
 
     /// The least of the merge queue among those that `may` be merged.
@@ -274,7 +289,7 @@ mod tests {
             assert_eq!(found.index(), index);
             queues.remove(found);
         }
-        assert_eq!(queues.lengths(), [0, 0, 0]);
+        assert_eq!(queues.lengths(), [0; 4]);
         assert_eq!(queues.first_to_merge(rank, |_| true), None);
     }
 }

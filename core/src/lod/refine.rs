@@ -32,7 +32,7 @@ pub struct Refinement {
     pub merges: u32,
     /// Splits that waited for a page.
     pub blocked: u32,
-    /// Bound of the worst leaf that could still be split, in pixels.
+    /// Bound of the worst leaf, in pixels.
     pub error_px_bound: f64,
 }
 
@@ -95,7 +95,7 @@ pub fn refine(
             break;
         }
     }
-    done.error_px_bound = worst_px(surface);
+    done.error_px_bound = surface.queues.worst_px(|id| surface.rank(id));
     list_wanted(surface, scratch, wanted);
     done
 }
@@ -179,13 +179,6 @@ fn make_room(surface: &mut Surface<'_>, top: DiamondId, done: &mut Refinement) -
     surface.merge(least);
     done.merges += 1;
     true
-}
-
-fn worst_px(surface: &Surface<'_>) -> f64 {
-    let split = surface.queues.first_to_split(|id| surface.rank(id));
-    let blocked = surface.queues.first_blocked();
-    let of = |id: Option<DiamondId>| id.map_or(0.0, |id| surface.diamonds.priority_px[id]);
-    of(split).max(of(blocked))
 }
 
 /// The most urgent pages, once each, no more than can be taken in.

@@ -58,13 +58,12 @@ const fn with_opposites(half: &[[f64; 3]; 16]) -> [[f64; 4]; 32] {
     all
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a table made at compile time")]
 const fn narrowed(wide: &[[f64; 4]; 32]) -> [[f32; 4]; 32] {
     let mut all = [[0.0; 4]; 32];
     let mut i = 0;
     while i < 32 {
         let [x, y, z, _] = wide[i];
-        all[i] = [x as f32, y as f32, z as f32, 0.0];
+        all[i] = [narrow(x), narrow(y), narrow(z), 0.0];
         i += 1;
     }
     all
