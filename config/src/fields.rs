@@ -6,7 +6,7 @@
 //! Not here: which settings there are (`scene`).
 
 use crate::fault::{Fault, FaultKind};
-use crate::tree::{Field, Kind, Node};
+use crate::node::{Field, Kind, Node};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 

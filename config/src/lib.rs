@@ -10,6 +10,7 @@
 
 mod fault;
 mod fields;
+mod node;
 mod scan;
 mod scene;
 mod tree;

@@ -5,7 +5,7 @@
 //! Keeps: the place in the text.
 //! Not here: brackets and what they hold (`tree`).
 
-use crate::tree::Kind;
+use crate::node::Kind;
 
 /// Something that is not RON, at byte `at`.
 pub(crate) struct Syntax {

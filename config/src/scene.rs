@@ -7,7 +7,7 @@
 
 use crate::fault::FaultKind;
 use crate::fields::{Group, Reader, Shape, words};
-use crate::tree::{Kind, Node};
+use crate::node::{Kind, Node};
 use overfly_core::datasource::procedural::Style;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::settings::{

@@ -37,7 +37,7 @@ use crate::record::{Frame, Scene};
 use crate::targets::Targets;
 use crate::upload::{Arena, Staged};
 use crate::vk::buffer::{Buffer, BufferInfo};
-use crate::vk::{Device, commands::OneOff};
+use crate::vk::{Device, commands::OneOff, transfer};
 use gpu_allocator::MemoryLocation;
 use overfly_core::frame::data::ViewDraws;
 use overfly_core::mesh::{Patches, topology};
@@ -201,7 +201,7 @@ impl Renderer {
             let (staging, vertices) = (&self.frames[frame].staging, &self.arena.vertices);
             let copies = &self.copies;
             self.one_off.run(|device, buffer| {
-                record::copies(device, buffer, (staging, vertices), copies);
+                transfer::copies(device, buffer, (staging, vertices), copies);
             })?;
         }
     }
@@ -239,7 +239,14 @@ impl Renderer {
             return Err(DrawError::NothingDrawn);
         }
         let targets = &self.targets;
-        self.one_off.run(|device, buffer| record::read_back(device, buffer, targets))?;
+        self.one_off.run(|device, buffer| {
+            transfer::read_back(
+                device,
+                buffer,
+                (&targets.colour, &targets.pixels),
+                targets.size_px,
+            );
+        })?;
         Ok(targets.pixels.mapped().to_vec())
     }
 
@@ -276,7 +283,7 @@ impl Renderer {
         let location = MemoryLocation::GpuOnly;
         let info = BufferInfo { name: "scratch of the hazard", bytes: 64, usage, location };
         let scratch = Buffer::new(&self.device, &info)?;
-        self.one_off.run(|device, buffer| record::hazard(device, buffer, &scratch))?;
+        self.one_off.run(|device, buffer| transfer::hazard(device, buffer, &scratch))?;
         Ok(())
     }
 }

@@ -6,12 +6,12 @@
 //! Not here: the pass that asks drivers for it (`spirv_pass.rs`).
 
 use crate::error::StartError;
-use crate::record;
+
 use crate::shaders;
 use crate::vk::buffer::{Buffer, BufferInfo, bytes_of};
 use crate::vk::pipeline::{Layout, Pipeline};
 use crate::vk::storage::StorageSet;
-use crate::vk::{Device, commands::OneOff};
+use crate::vk::{Device, commands::OneOff, transfer};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use overfly_core::geodesy::{Ecef, TwoFloat};
@@ -45,7 +45,7 @@ pub(crate) fn run(device: &Arc<Device>, one_off: &mut OneOff) -> Result<(), Star
     let layout = Layout::new(device, "self-test", &layout_info)?;
     let pipeline = Pipeline::compute(device, &layout, "self-test", &shaders::self_test())?;
     one_off.run(|device, commands| {
-        record::self_test(device, commands, (&pipeline, &layout), &set, ITEMS / 64);
+        transfer::self_test(device, commands, (&pipeline, &layout), &set, ITEMS / 64);
     })?;
     let answers = buffer.mapped().chunks_exact(ROWS * 16);
     let wrong = cases.iter().zip(answers).filter(|&(case, bytes)| !agrees(case, bytes)).count();

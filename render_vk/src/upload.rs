@@ -186,7 +186,7 @@ fn index_buffer(
     )?;
     let copy = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size }];
     one_off.run(|device, buffer| {
-        crate::record::copies(device, buffer, (&staging, &indices), &copy);
+        crate::vk::transfer::copies(device, buffer, (&staging, &indices), &copy);
     })?;
     Ok(indices)
 }

@@ -15,6 +15,7 @@ pub(crate) mod messages;
 pub(crate) mod names;
 pub(crate) mod pipeline;
 pub(crate) mod storage;
+pub(crate) mod transfer;
 
 pub(crate) use buffer::Buffer;
 pub(crate) use device::Device;
