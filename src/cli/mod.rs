@@ -11,6 +11,7 @@ pub mod doctor;
 pub mod json;
 pub mod replay;
 pub mod report;
+pub mod run;
 pub mod source;
 pub mod stills;
 

@@ -1,0 +1,184 @@
+//! The loop of a replay: frame by frame from a source through the terrain to what is kept.
+//!
+//! In:    a [`Run`], made from the arguments; the terrain.
+//! Out:   columns, digests, stills, a recording.
+//! Keeps: [`Run`].
+//! Not here: arguments, tables and exit codes (`replay`).
+
+use super::Failure;
+use super::columns::Columns;
+use super::source::Source;
+use super::stills::Stills;
+use indicatif::{ProgressBar, ProgressStyle};
+use overfly::Overfly;
+use overfly::core::datasource::PageKey;
+use overfly::core::frame::{FrameInput, FrameOutput};
+use overfly::core::settings::SceneSettings;
+use overfly::jobs::now_ns;
+use overfly::loader::Loader;
+use overfly::replay::{RecordedFrame, RunDigest, Writer};
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most frames of a flight's lead-in.
+const LEAD_IN_MAX: usize = 600;
+
+/// What one run works with, beside the terrain.
+pub struct Run {
+    pub scene: SceneSettings,
+    pub source: Source,
+    /// Frames that run; those before `reported.start` only lead there.
+    pub ran: Range<usize>,
+    pub reported: Range<usize>,
+    pub size_px: [u32; 2],
+    /// Frames that a page takes beyond the next.
+    pub delay: usize,
+    /// Pages on their way: the frame in which they arrive, counted with the lead-in.
+    pub coming: VecDeque<(usize, PageKey)>,
+    /// Frames run so far, lead-in included.
+    pub count: usize,
+    pub stills: Vec<usize>,
+    pub draws: bool,
+    pub loader: Loader,
+    pub recorder: Option<Writer>,
+    pub columns: Columns,
+    pub digest: RunDigest,
+    pub diverged: Option<(usize, &'static str)>,
+    pub pictures: Stills,
+}
+
+/// All frames. False if Ctrl-C ended them early.
+pub fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
+    let style = "{bar:40} {pos}/{len} frames, {per_sec}, {eta} left";
+    let bar = ProgressBar::new(run.ran.len() as u64)
+        .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
+    let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    if !lead_in(run, overfly, &stop, (&mut input, &mut output))? {
+        return Ok(false);
+    }
+    for index in run.ran.clone() {
+        if stop.load(Ordering::Relaxed) {
+            bar.abandon();
+            return Ok(false);
+        }
+        frame(run, overfly, (index, true), (&mut input, &mut output))?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(true)
+}
+
+/// Holds the clock until the terrain has come up: a flight's first pose until nothing changes, a
+/// recording's frames before its time moves. False if Ctrl-C ended it.
+fn lead_in(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    stop: &AtomicBool,
+    (input, output): (&mut FrameInput, &mut FrameOutput),
+) -> Result<bool, Failure> {
+    let recorded = run.source.lead_in();
+    let is_recording = matches!(run.source, Source::Recording(_));
+    for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        let begin = if is_recording { index } else { run.ran.start };
+        frame(run, overfly, (begin, false), (input, output))?;
+        let c = &output.counts;
+        let settled = c.leaves > 0 && c.splits + c.merges + c.wanted == 0 && run.coming.is_empty();
+        if !is_recording && settled {
+            break;
+        }
+    }
+    Ok(true)
+}
+
+/// One frame: pages in, stages, what comes out. Frames of the lead-in are recorded and checked,
+/// but not counted.
+fn frame(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    (index, counted): (usize, bool),
+    (input, output): (&mut FrameInput, &mut FrameOutput),
+) -> Result<(), Failure> {
+    let begin_ns = now_ns();
+    let played = index + if counted { run.source.lead_in() } else { 0 };
+    run.source.fill(played, &run.scene, run.size_px, input);
+    let arriving = arriving(run, played, &output.wanted);
+    run.loader.fetch(&arriving, &mut input.arrived);
+    let mut record =
+        RecordedFrame { time_s: input.time_s, arrived: arriving, ..Default::default() };
+    if run.recorder.is_some() {
+        record.views.extend_from_slice(&input.views);
+    }
+    let reported = counted && run.reported.contains(&index);
+    let still = run.stills.contains(&index);
+    let drawn = run.draws && reported && (still || run.stills.is_empty());
+    let ready_ns = now_ns();
+    if drawn {
+        overfly.frame_drawn(input, output, 0)?;
+    } else {
+        overfly.frame(input, output)?;
+    }
+    let end_ns = now_ns();
+    if still && drawn {
+        take_stills(run, overfly, index, output)?;
+    }
+    if let Some(recorder) = &mut run.recorder {
+        record.digest = output.digest;
+        recorder.frame(&record)?;
+    }
+    if run.diverged.is_none()
+        && let Some(stage) = run.source.difference(played, &output.digest)
+    {
+        run.diverged = Some((index, stage));
+    }
+    if reported {
+        run.digest.add(&output.digest);
+        run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
+    }
+    Ok(())
+}
+
+/// The pages of this frame: as recorded; else what was wanted and is due.
+fn arriving(run: &mut Run, played: usize, wanted: &[PageKey]) -> Vec<PageKey> {
+    if let Some(keys) = run.source.arrived(played) {
+        return keys.to_vec();
+    }
+    for &key in wanted {
+        if run.coming.iter().all(|&(_, known)| known != key) {
+            run.coming.push_back((run.count + run.delay, key));
+        }
+    }
+    let due = run.coming.iter().take_while(|&&(due, _)| due <= run.count).count();
+    run.count += 1;
+    run.coming.drain(..due).map(|(_, key)| key).collect()
+}
+
+/// A still of each view; the first is drawn already.
+fn take_stills(
+    run: &mut Run,
+    overfly: &mut Overfly,
+    index: usize,
+    output: &FrameOutput,
+) -> Result<(), Failure> {
+    for view in 0..output.views.len() {
+        if view > 0 {
+            overfly.draw(output, view)?;
+        }
+        let name = match run.scene.views.get(view) {
+            Some(lens) if output.views.len() > 1 => format!("{}-", lens.name),
+            _ => String::new(),
+        };
+        let pixels = overfly.with_renderer(|renderer| renderer.read_pixels());
+        if let Some(pixels) = pixels.transpose()? {
+            run.pictures.add(index, &name, run.size_px, pixels)?;
+        }
+    }
+    Ok(())
+}
