@@ -145,8 +145,11 @@ impl Display for LoadError {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         match self {
             Self::Read { file, source } => {
-                let presets = crate::PRESETS.join(", ");
-                write!(f, "cannot read scene {file}: {source} (the presets are {presets})")
+                write!(f, "cannot read scene {file}: {source}")?;
+                if source.kind() == io::ErrorKind::NotFound {
+                    write!(f, " (the presets are {})", crate::PRESETS.join(", "))?;
+                }
+                Ok(())
             }
             Self::Faults(faults) => write!(f, "{faults}"),
         }

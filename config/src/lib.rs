@@ -87,7 +87,18 @@ pub fn load(name_or_path: &str) -> Result<SceneSettings, LoadError> {
     if let Some(text) = preset(name_or_path) {
         return read(text, &format!("{name_or_path}.ron")).map_err(LoadError::Faults);
     }
-    let text = std::fs::read_to_string(name_or_path)
+    let text = read_file(name_or_path)
         .map_err(|source| LoadError::Read { file: name_or_path.to_owned(), source })?;
-    read(&text, name_or_path).map_err(LoadError::Faults)
+    // Some editors begin a file with a byte order mark; RON does not know it.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    read(text, name_or_path).map_err(LoadError::Faults)
+}
+
+/// A scene file's text. Devices and pipes, which may never end, are refused.
+fn read_file(path: &str) -> std::io::Result<String> {
+    let about = std::fs::metadata(path)?;
+    if !about.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    std::fs::read_to_string(path)
 }

@@ -22,14 +22,16 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let scene = config::load(&arguments.scene)?;
     for (path, value) in scene.listing() {
-        println!("{path:<22} {value}");
+        say!("{path:<22} {value}");
     }
+    let sun = scene.sun.map_or("none".into(), |sun| format!("{:?}", sun.direction.to_array()));
+    say!("{:<22} {sun} (drawing only: recordings do not compare it)", "sun");
     let limits = Limits::of(&scene);
     let pages_mib = u64::from(limits.pages) * size_of::<Page>() as u64 / (1 << 20);
-    println!("\nleaf triangles at most {}", limits.leaves);
-    println!("diamond records        {}", limits.diamonds);
-    println!("resident pages         {} ({pages_mib} MiB)", limits.pages);
-    println!("patches built a frame  {}", limits.built);
-    println!("settings digest        {:016x}", scene.digest());
+    say!("\nleaf triangles at most {}", limits.leaves);
+    say!("diamond records        {}", limits.diamonds);
+    say!("resident pages         {} ({pages_mib} MiB)", limits.pages);
+    say!("patches built a frame  {}", limits.built);
+    say!("settings digest        {:016x}", scene.digest());
     Ok(ExitCode::SUCCESS)
 }

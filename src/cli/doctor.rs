@@ -14,33 +14,33 @@ const VALIDATION: &str = "VK_LAYER_KHRONOS_validation";
 /// Runs the command.
 pub fn run() -> ExitCode {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    println!("cores       {cores}: `--workers {}` uses all of them", cores.saturating_sub(1));
+    say!("cores       {cores}: `--workers {}` uses all of them", cores.saturating_sub(1));
     match render_vk::devices() {
         Ok(devices) if devices.is_empty() => return lacking("no Vulkan device"),
         Ok(devices) => {
             for device in devices {
                 let render_vk::DeviceInfo { name, kind, driver, api_version } = device;
-                println!("device      {name} ({kind}), {driver}, Vulkan {api_version}");
+                say!("device      {name} ({kind}), {driver}, Vulkan {api_version}");
             }
         }
         Err(error) => return lacking(&error.to_string()),
     }
     match render_vk::layers() {
         Ok(layers) if layers.iter().any(|layer| layer == VALIDATION) => {
-            println!("validation  {VALIDATION}");
+            say!("validation  {VALIDATION}");
         }
-        Ok(_) => println!(
+        Ok(_) => say!(
             "validation  missing: tests cannot check Vulkan use\n            \
              Debian, Ubuntu: apt-get install vulkan-validationlayers"
         ),
-        Err(_) => println!("validation  unknown without a Vulkan loader"),
+        Err(_) => say!("validation  unknown without a Vulkan loader"),
     }
     ExitCode::SUCCESS
 }
 
 fn lacking(what: &str) -> ExitCode {
-    println!("device      none: {what}");
-    println!("            everything but drawing works: replay with --no-render");
-    println!("            Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers");
+    say!("device      none: {what}");
+    say!("            everything but drawing works: replay with --no-render");
+    say!("            Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers");
     ExitCode::from(super::NO_DEVICE)
 }

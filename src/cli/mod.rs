@@ -5,6 +5,14 @@
 //! Keeps: nothing.
 //! Not here: the library (`overfly`).
 
+/// Prints a line. A reader that went away, as in `overfly … | head`, is no reason to stop a run.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 pub mod check;
 pub mod columns;
 pub mod doctor;
@@ -15,7 +23,7 @@ pub mod run;
 pub mod source;
 pub mod stills;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A replay left the recorded states.
 pub const DIVERGED: u8 = 1;
@@ -41,6 +49,30 @@ Examples:
 /// What ends a command early, in words for the user.
 pub type Failure = Box<dyn std::error::Error>;
 
+/// Where a run writes to, checked before it begins: links are followed, missing folders made;
+/// refused is what is no regular file, and what the run reads or writes already.
+pub fn place_of(path: &Path, taken: &mut Vec<PathBuf>) -> Result<PathBuf, Failure> {
+    let failed = |error| format!("{}: {error}", path.display());
+    let refused = |why| Err(format!("{}: {why}", path.display()).into());
+    let place = match std::fs::metadata(path) {
+        Ok(about) if about.is_file() => path.canonicalize().map_err(failed)?,
+        Ok(_) => return refused("is there and is not a regular file"),
+        Err(_) if path.is_symlink() => return refused("is a link to nothing"),
+        Err(_) => {
+            let Some(name) = path.file_name() else { return refused("names no file") };
+            let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+            let folder = parent.unwrap_or(Path::new("."));
+            std::fs::create_dir_all(folder).map_err(failed)?;
+            folder.canonicalize().map_err(failed)?.join(name)
+        }
+    };
+    if taken.contains(&place) {
+        return refused("is an input or another output of this run already");
+    }
+    taken.push(place.clone());
+    Ok(place)
+}
+
 /// Writes a file beside its place and renames it there, so that a kill leaves the old one or none.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |error| format!("{}: {error}", path.display());
@@ -49,7 +81,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     }
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
-    std::fs::write(&beside, bytes).map_err(failed)?;
-    std::fs::rename(&beside, path).map_err(failed)?;
-    Ok(())
+    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path));
+    if written.is_err() {
+        // What is half written helps nobody; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&beside);
+    }
+    Ok(written.map_err(failed)?)
 }

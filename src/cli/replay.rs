@@ -9,7 +9,7 @@ use super::columns::Columns;
 use super::run::{Run, fly};
 use super::source::{Source, recording_header};
 use super::stills::{Stills, chosen};
-use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, report, write_whole};
+use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, place_of, report, write_whole};
 use overfly::core::settings::SceneSettings;
 use overfly::render_vk::{Renderer, RendererSettings};
 use overfly::replay::{Ending, Header, RunDigest, Writer};
@@ -81,12 +81,13 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let places = places(arguments)?;
     let header = recording_header(&arguments.flight)?;
     let (scene_name, scene) = scene_of(arguments, header.as_ref())?;
     let workers = arguments.workers.map_or_else(default_workers, usize::from);
     let mut overfly = Overfly::new(&scene, workers)?;
-    let mut run = prepare(arguments, scene, &mut overfly)?;
-    println!(
+    let mut run = prepare(arguments, &places, scene, &mut overfly)?;
+    say!(
         "{} over {scene_name}, frames {}..{} at {} Hz, {workers} workers",
         run.source.name(),
         run.reported.start,
@@ -96,18 +97,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Source::Flight(flight, _) = &run.source
         && flight.raised_m > 0.0
     {
-        println!("raised by {:.0} m to stay clear of this scene's ground", flight.raised_m);
+        say!("raised by {:.0} m to stay clear of this scene's ground", flight.raised_m);
     }
     let finished = fly(&mut run, &mut overfly)?;
     if let Some(recorder) = run.recorder.take() {
         let frames = recorder.frames();
         recorder.finish()?;
-        let path = arguments.record.as_ref().expect("there was a recorder");
-        println!("recorded {frames} frames, lead-in included: {}", path.display());
+        let path = places.record.as_ref().expect("there was a recorder");
+        say!("recorded {frames} frames, lead-in included: {}", path.display());
     }
-    print!("{}", report::table(&run.columns));
-    println!("digest {:016x} of {} frames", run.digest.value(), run.digest.frames());
-    if let Some(path) = &arguments.json {
+    say!("{}", report::table(&run.columns).trim_end());
+    say!("digest {:016x} of {} frames", run.digest.value(), run.digest.frames());
+    if let Some(path) = &places.json {
         let facts = json::Facts {
             flight: run.source.name(),
             scene: &scene_name,
@@ -118,16 +119,16 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             diverged: run.diverged,
         };
         write_whole(path, json::text(&facts, &run.columns).as_bytes())?;
-        println!("wrote {}", path.display());
+        say!("wrote {}", path.display());
     }
     for file in run.pictures.finish()? {
-        println!("wrote {}", file.display());
+        say!("wrote {}", file.display());
     }
     let messages = overfly.with_renderer(|renderer| renderer.validation_messages());
     let messages = messages.unwrap_or_default();
     messages.iter().for_each(|message| eprintln!("overfly: validation: {message}"));
     if arguments.validate {
-        println!("validation messages: {}", messages.len());
+        say!("validation messages: {}", messages.len());
     }
     let code = verdict(&run.source, run.diverged, finished);
     Ok(if messages.is_empty() { code } else { ExitCode::from(DIVERGED) })
@@ -137,9 +138,14 @@ fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: b
     match source.ending() {
         Ending::Complete => {}
         Ending::Unfinished => {
-            println!("the file has no end mark: its writer was stopped after its last frame");
+            say!("the file has no end mark: its writer was stopped after its last frame");
         }
-        Ending::Damaged(error) => eprintln!("overfly: {error}; the frames before it were played"),
+        Ending::Damaged(error) => {
+            let lead_in = source.lead_in();
+            eprintln!(
+                "overfly: {error} ({lead_in} of them lead-in); the frames before it were played"
+            );
+        }
     }
     if let Some((frame, stage)) = diverged {
         eprintln!("overfly: diverged from the recording in frame {frame}, stage {stage}");
@@ -153,7 +159,7 @@ fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: b
         return ExitCode::from(INTERRUPTED);
     }
     if matches!(source, Source::Recording(_)) {
-        println!("same as recorded");
+        say!("same as recorded");
     }
     ExitCode::SUCCESS
 }
@@ -178,15 +184,48 @@ fn default_workers() -> usize {
     std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1).min(64)
 }
 
+/// Where the run writes to.
+struct Places {
+    record: Option<PathBuf>,
+    json: Option<PathBuf>,
+}
+
+/// Checks every output before anything runs; none may be an input or another output.
+fn places(arguments: &Arguments) -> Result<Places, Failure> {
+    let inputs = [Some(&arguments.flight), arguments.scene.as_ref()];
+    let mut taken: Vec<PathBuf> =
+        inputs.into_iter().flatten().filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    let mut place = |path: &Option<PathBuf>| -> Result<Option<PathBuf>, Failure> {
+        path.as_deref().map(|path| place_of(path, &mut taken)).transpose()
+    };
+    let places = Places { record: place(&arguments.record)?, json: place(&arguments.json)? };
+    match &arguments.out {
+        Some(out) if out.exists() && !out.is_dir() => {
+            Err(format!("--out {}: is there and is not a folder", out.display()).into())
+        }
+        _ => Ok(places),
+    }
+}
+
 fn prepare(
     arguments: &Arguments,
+    places: &Places,
     scene: SceneSettings,
     overfly: &mut Overfly,
 ) -> Result<Run, Failure> {
     let source = Source::open(&arguments.flight, &scene, |name| overfly.flight(name))?;
     let count = source.frames();
     let reported = arguments.frames.clone().unwrap_or(0..count);
-    if reported.end > count || count == 0 {
+    if count == 0 {
+        verdict(&source, None, true);
+        let lead_in = source.lead_in();
+        return Err(format!(
+            "{} holds no frame beyond {lead_in} in which the terrain came up",
+            arguments.flight
+        )
+        .into());
+    }
+    if reported.end > count {
         let name = &arguments.flight;
         let asked = format!("{}..{}", reported.start, reported.end);
         return Err(format!("--frames {asked}: {name} has {count} frames, 0..{count}").into());
@@ -195,13 +234,16 @@ fn prepare(
     if is_recording && (arguments.size.is_some() || arguments.loader_delay_ms.is_some()) {
         return Err("--size and --loader-delay-ms do not go with a recording: it holds both".into());
     }
+    if is_recording && arguments.record.is_some() && arguments.frames.is_some() {
+        return Err("--record and --frames do not go with a recording: it is recorded whole".into());
+    }
     let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
     let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px, arguments.validate)?;
     let stills = arguments.stills.map_or(0, usize::from);
     let delay_s = f64::from(arguments.loader_delay_ms.unwrap_or(0)) / 1e3;
     let delay = (0..).find(|&frames| f64::from(frames) >= delay_s * source.rate_hz());
     let folder = PathBuf::from("out").join(source.name());
-    let recorder = arguments.record.as_ref().map(|path| {
+    let recorder = places.record.as_ref().map(|path| {
         let mut header = Header::recording(source.name(), source.rate_hz(), &scene);
         header.scene_text = scene_text(arguments, &source);
         Writer::create(path, &header)
@@ -255,12 +297,12 @@ fn add_renderer(
     };
     match Renderer::new(&settings) {
         Ok(renderer) => {
-            println!("drawing on {}", renderer.device_line());
+            say!("drawing on {}", renderer.device_line());
             overfly.set_renderer(renderer);
             Ok(true)
         }
         Err(error) => {
-            println!("not drawing: {error}");
+            say!("not drawing: {error}");
             Ok(false)
         }
     }

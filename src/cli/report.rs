@@ -48,7 +48,7 @@ pub fn table(columns: &Columns) -> String {
             line(&mut text, name, [s.p50, s.p95, s.p99, s.max].map(cell));
         }
     }
-    let waited_s = columns.waited_ms.iter().sum::<f64>() / 1e3;
+    let waited_s = columns.waited_ms.iter().fold(0.0, |sum, ms| sum + ms) / 1e3;
     writeln!(text, "waited for pages       {waited_s:.2} s, outside the frames").expect("text");
     text
 }

@@ -54,13 +54,16 @@ pub fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
-    let style = "{bar:40} {pos}/{len} frames, {per_sec}, {eta} left";
+    let style = "{bar:40} {pos}/{len} frames, {per_sec}, {eta} left {msg}";
     let bar = ProgressBar::new(run.ran.len() as u64)
         .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
     let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    bar.set_message("the terrain comes up");
     if !lead_in(run, overfly, &stop, (&mut input, &mut output))? {
+        bar.abandon();
         return Ok(false);
     }
+    bar.set_message("");
     for index in run.ran.clone() {
         if stop.load(Ordering::Relaxed) {
             bar.abandon();
@@ -109,6 +112,10 @@ fn frame(
     let begin_ns = now_ns();
     let played = index + if counted { run.source.lead_in() } else { 0 };
     run.source.fill(played, &run.scene, run.size_px, input);
+    if !counted && matches!(run.source, Source::Flight(..)) {
+        // The lead-in's clock stands one frame before the first: so a recording tells them apart.
+        input.time_s -= 1.0 / run.source.rate_hz();
+    }
     let arriving = arriving(run, played, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
     let mut record =

@@ -92,12 +92,16 @@ impl Source {
         }
     }
 
-    /// Frames of a recording before time begins to move: there the terrain came up.
+    /// Frames of a recording in which time stands still at its beginning: the terrain comes up.
     pub fn lead_in(&self) -> usize {
         let Self::Recording(recording) = self else { return 0 };
         let Some(first) = recording.frames.first() else { return 0 };
         let still = |frame: &&RecordedFrame| frame.time_s == first.time_s;
-        recording.frames.iter().take_while(still).count() - 1
+        // A single frame stands by itself: it takes two for time to stand still.
+        match recording.frames.iter().take_while(still).count() {
+            1 => 0,
+            frames => frames,
+        }
     }
 
     /// How the file ends.

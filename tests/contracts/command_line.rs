@@ -89,6 +89,50 @@ fn check_reports_every_fault_of_a_scene_at_once() {
 }
 
 #[test]
+fn outputs_are_checked_before_anything_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(path("scene.ron"), "Scene(body: Sphere(radius_m: 1000.0))").unwrap();
+    let replay = ["replay", "poles", "--no-render", "--frames", "0..3", "--scene"];
+    let (scene, same, link) = (path("scene.ron"), path("same"), path("link"));
+    std::os::unix::fs::symlink(path("nothing"), &link).unwrap();
+    for (outputs, why) in [
+        (vec!["--record", scene.as_str()], "is an input or another output"),
+        (vec!["--record", &same, "--json", &same], "is an input or another output"),
+        (vec!["--json", "/dev/null"], "is not a regular file"),
+        (vec!["--json", "/"], "is not a regular file"),
+        (vec!["--json", &link], "is a link to nothing"),
+        (vec!["--out", &scene], "is not a folder"),
+    ] {
+        let arguments = [&replay[..], &[&scene], &outputs].concat();
+        let Outcome { code, err, .. } = overfly(&arguments);
+        assert_eq!(code, 2, "{outputs:?}: {err}");
+        assert!(err.contains(why), "{outputs:?}: {err}");
+    }
+    assert!(std::fs::read_to_string(&scene).unwrap().starts_with("Scene("));
+    let nested = path("made/for/it.json");
+    let done = overfly(&[&replay[..], &[&scene, "--json", &nested]].concat());
+    assert_eq!(done.code, 0, "{done:?}");
+    assert!(std::fs::read_to_string(&nested).unwrap().contains("overfly-replay-1"));
+}
+
+#[test]
+fn a_reader_that_goes_away_does_not_stop_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.ovf").display().to_string();
+    let mut child = command()
+        .args(["replay", "poles", "--scene", "small", "--no-render", "--frames", "0..40"])
+        .args(["--record", &file])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let again = overfly(&["replay", &file, "--no-render"]);
+    assert_eq!((again.code, again.digest_frames()), (0, 40), "{again:?}");
+}
+
+#[test]
 fn json_holds_a_column_for_every_stage_and_count() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.json");

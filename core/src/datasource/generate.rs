@@ -92,9 +92,9 @@ impl Generator {
             let edge_m = metres(edge * step);
             let sagitta_m = edge_m * edge_m / (8.0 * curvature_min);
             let ground_m = if drowned { 0.0 } else { self.planet.residual_m(edge_m, ruggedness) };
-            // Where water meets land, an edge cuts the corner between them.
+            // Where water meets land, an edge that rises by d cuts the corner by d/4 at most.
             let corner_m =
-                if shore { self.planet.variation_m(edge_m, ruggedness) / 2.0 } else { 0.0 };
+                if shore { self.planet.variation_m(edge_m, ruggedness) / 4.0 } else { 0.0 };
             narrow(ground_m + corner_m + sagitta_m)
         };
         let [odd, even] = edges(self.patch_depth);
