@@ -43,8 +43,8 @@ Examples:
   overfly doctor
   overfly replay rainier --no-render
   overfly replay descent --stills 8 --size 1280x720
-  overfly replay poles --record poles.ovf --loader-delay-ms 50
-  overfly replay poles.ovf --workers 0";
+  overfly replay poles --no-render --record poles.ovf --loader-delay-ms 50
+  overfly replay poles.ovf --no-render --workers 0";
 
 /// What ends a command early, in words for the user.
 pub type Failure = Box<dyn std::error::Error>;
