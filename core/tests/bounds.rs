@@ -41,14 +41,15 @@ fn worst_ratio(rig: &Rig, body: &Ellipsoid, sea: bool) -> (f64, u32) {
     let (lod, patches) = (rig.terrain.lod(), rig.terrain.patches());
     let pattern = indices(patches.patch_depth);
     let (mut worst, mut points) = (0.0_f64, 0);
-    let leaves = lod.diamonds.ids().flat_map(|id| {
-        let node = &lod.diamonds.node[id];
-        let bounded = page_is_finest(node.shape.level, patches.patch_depth);
-        node.patches.into_iter().flatten().filter(move |_| bounded).map(move |slot| (id, slot))
+    let diamonds = &lod.mesh.diamonds;
+    let leaves = diamonds.ids().flat_map(|id| {
+        let bounded = page_is_finest(diamonds[id].level(), patches.patch_depth);
+        let slots = lod.cover.patches[id].into_iter().flatten();
+        slots.filter(move |_| bounded).map(move |slot| (id, slot))
     });
     for (id, slot) in leaves.flat_map(|leaf| [leaf, leaf]) {
-        let (node, region) = (&lod.diamonds.node[id], &lod.diamonds.region[id]);
-        let seed = node.key ^ u64::from(slot) << 40 ^ points;
+        let (record, region) = (&diamonds[id], &lod.cover.region[id]);
+        let seed = record.key() ^ u64::from(slot) << 40 ^ points;
         let there =
             body.geodetic_from_ecef(Ecef(point_of(patches.vertices_of(slot), &pattern, seed)));
         let ground_m = rig.generator.planet().sample(there.normal()).height_m;
@@ -57,7 +58,7 @@ fn worst_ratio(rig: &Rig, body: &Ellipsoid, sea: bool) -> (f64, u32) {
         points += 1;
         let [low_m, high_m] = [region.low_m - 1e-3, region.high_m + 1e-3];
         let inside = (low_m..=high_m).contains(&ground_m);
-        assert!(inside, "{ground_m} m outside {low_m}..{high_m} m, level {}", node.shape.level);
+        assert!(inside, "{ground_m} m outside {low_m}..{high_m} m, level {}", record.level());
     }
     (worst, u32::try_from(points).unwrap())
 }
@@ -95,11 +96,11 @@ fn patches_hold_the_heights_of_their_lattice_points() {
     rig.settle(&[view(&body, Geodetic::from_degrees(46.8, -121.8, 3_000.0), 30.0, -35.0)]);
     let (lod, patches) = (rig.terrain.lod(), rig.terrain.patches());
     let mut checked = 0;
-    for id in lod.diamonds.ids() {
-        let node = &lod.diamonds.node[id];
+    for id in lod.mesh.diamonds.ids() {
+        let shape = lod.mesh.diamonds.shape(id);
         for side in 0..2 {
-            let Some(slot) = node.patches[side] else { continue };
-            let points = lattice_points(node.shape.triangle(side), 4);
+            let Some(slot) = lod.cover.patches[id][side] else { continue };
+            let points = lattice_points(shape.triangle(side), 4);
             for (point, vertex) in points.into_iter().zip(patches.vertices_of(slot)).step_by(7) {
                 let normal = overfly_core::lattice::normal_of(point);
                 let height_m = rig.generator.planet().sample(normal).height_m;

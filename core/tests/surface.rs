@@ -91,8 +91,9 @@ fn the_deepest_level_is_kept_and_its_error_is_told() {
         rig.settle(&[view(&EARTH, at(46.8, -121.8, 3_000.0), 0.0, -30.0)]);
         rig.audit();
         let lod = rig.terrain.lod();
-        let leaves = lod.diamonds.ids().map(|id| lod.diamonds.node[id]);
-        let deepest = leaves.filter(|node| node.patches != [None; 2]).map(|node| node.shape.level);
+        let diamonds = &lod.mesh.diamonds;
+        let leaves = diamonds.ids().filter(|&id| lod.cover.patches[id] != [None; 2]);
+        let deepest = leaves.map(|id| diamonds[id].level());
         assert_eq!(deepest.max(), Some(level_max));
         assert!(rig.output.counts.error_px_bound > settings.lod.tolerance.0);
     }

@@ -14,11 +14,10 @@ use crate::datasource::generate::Generator;
 use crate::datasource::pages::Pages;
 use crate::digest::Chain;
 use crate::limits::Limits;
-use crate::lod::operate::Surface;
-use crate::lod::queues::Queues;
-use crate::lod::refine::{PRIORITY_GRAIN, Scratch, prioritise_chunk, refine, settle};
-use crate::lod::screen_error::{Horizon, Sight};
-use crate::lod::{Diamonds, audit};
+use crate::lod::cover::{Cover, Planet, judge};
+use crate::lod::refine::{Knobs, Mesh, Refinement};
+use crate::lod::screen_error::{Horizon, Sight, motion_between};
+use crate::lod::{audit, want};
 use crate::mesh::build::{BLOCK, Block as BuildBlock, Ground, build_block, store};
 use crate::mesh::patches::Patches;
 use crate::mesh::place::{self, Block as PlaceBlock, empty_draws, join, place_block};
@@ -36,13 +35,18 @@ const REFINE: Span = Span("lod.refine");
 const BUILD: Span = Span("mesh.build");
 const PLACE: Span = Span("mesh.place");
 
-/// Diamonds, their queues, and what `refine` keeps.
+/// Diamonds judged in one chunk: some 10 µs of work.
+const GRAIN: usize = 256;
+
+/// The surface, and what the planet hangs on it.
 pub struct Lod {
-    /// Every diamond with a record.
-    pub diamonds: Diamonds,
-    /// Their queues.
-    pub queues: Queues,
-    scratch: Scratch,
+    /// Diamonds and when to look at which.
+    pub mesh: Mesh,
+    /// Bounds, pages and patches of each diamond.
+    pub cover: Cover,
+    /// The sights of the last frame, from which motion is counted.
+    before: Vec<Sight>,
+    judges_all: bool,
 }
 
 #[derive(Default)]
@@ -82,9 +86,10 @@ impl Terrain {
             eyes: RwLock::default(),
             pages: RwLock::new(Pages::new(limits.pages)),
             lod: RwLock::new(Lod {
-                diamonds: Diamonds::new(limits.diamonds),
-                queues: Queues::new(limits.diamonds),
-                scratch: Scratch::new(limits.diamonds),
+                mesh: Mesh::new(limits.diamonds, knobs_of(settings, &limits)),
+                cover: Cover::new(limits.diamonds),
+                before: Vec::new(),
+                judges_all: false,
             }),
             build_blocks: Mutex::new(BuildBlock::for_patches(
                 limits.built,
@@ -130,7 +135,7 @@ impl Terrain {
         self.patches.read()
     }
 
-    /// Diamonds and queues, for tests and tools.
+    /// Diamonds, agenda and cover, for tests and tools.
     pub fn lod(&self) -> RwLockReadGuard<'_, Lod> {
         self.lod.read()
     }
@@ -145,14 +150,20 @@ impl Terrain {
         &self.output
     }
 
-    /// Holds every link, queue, page use and patch against each other.
+    /// Whether every frame judges every diamond, whatever the motion: the same mesh for more work,
+    /// which is what tests and benchmarks compare with.
+    pub fn judge_all(&self, always: bool) {
+        self.lod.write().judges_all = always;
+    }
+
+    /// Holds every link, seat, page use and patch against each other.
     ///
     /// # Errors
     /// What does not agree, in words.
     pub fn audit(&self) -> Result<(), String> {
         let (lod, pages, patches) = (self.lod.read(), self.pages.read(), self.patches.read());
-        audit::consistent(&lod.diamonds, &lod.queues, &pages, &patches)?;
-        audit::closed(&lod.diamonds, &patches)
+        audit::consistent(&lod.mesh, &lod.cover, &pages, &patches)?;
+        audit::closed(&lod.mesh.diamonds, &lod.cover, &patches)
     }
 }
 
@@ -198,18 +209,31 @@ fn admit(terrain: &Terrain) {
     output.digest.pages = pages.digest();
 }
 
-/// Every queued priority anew, in parallel over the pool.
+fn knobs_of(settings: &SceneSettings, limits: &Limits) -> Knobs {
+    let lod = &settings.lod;
+    Knobs {
+        tolerance_px: lod.tolerance.0,
+        leaves_max: limits.leaves,
+        splits_max: lod.splits_max,
+        merges_max: lod.merges_max,
+        level_max: lod.level_max,
+    }
+}
+
+/// Judges, in parallel, the diamonds that the motion of the views made due.
 fn prioritise(terrain: &Terrain, team: &Team<'_>) {
     let eyes = terrain.eyes.read();
     let mut lod = terrain.lod.write();
-    let Lod { diamonds, queues, .. } = &mut *lod;
-    let used = diamonds.pool.used_end() as usize;
-    let regions = &diamonds.region.as_slice()[..used];
-    let priorities = &mut diamonds.priority_px.as_mut_slice()[..used];
-    team.for_each_chunk(priorities, PRIORITY_GRAIN, |first, out| {
-        prioritise_chunk((queues, regions), &eyes.sights, first, out);
+    let Lod { mesh, cover, before, judges_all } = &mut *lod;
+    let motion = if *judges_all { None } else { motion_between(before, &eyes.sights) };
+    before.clear();
+    before.extend_from_slice(&eyes.sights);
+    let cover = &*cover;
+    let judge = |diamonds: &_, id, band| judge(cover, &eyes.sights, (diamonds, id), band);
+    let evaluations = mesh.prioritise(&judge, motion, &|verdicts, body| {
+        team.for_each_chunk(verdicts, GRAIN, body);
     });
-    terrain.output.lock().counts.evaluations = settle(diamonds, queues);
+    terrain.output.lock().counts.evaluations = evaluations;
 }
 
 /// Splits and merges.
@@ -219,10 +243,11 @@ fn refine_surface(terrain: &Terrain) {
     let mut pages = terrain.pages.write();
     let mut patches = terrain.patches.write();
     let mut output = terrain.output.lock();
-    let Lod { diamonds, queues, scratch } = &mut *lod;
-    let mut surface = Surface {
-        diamonds,
-        queues,
+    let Lod { mesh, cover, .. } = &mut *lod;
+    let output = &mut *output;
+    output.wanted.clear();
+    let mut planet = Planet {
+        cover,
         pages: &mut pages,
         patches: &mut patches,
         sights: &eyes.sights,
@@ -231,19 +256,34 @@ fn refine_surface(terrain: &Terrain) {
         lod: &terrain.settings.lod,
         frame: output.frame,
     };
-    let output = &mut *output;
-    output.wanted.clear();
-    let done = refine(&mut surface, terrain.limits.leaves, scratch, &mut output.wanted);
-    let counts = &mut output.counts;
-    counts.leaves = surface.diamonds.leaves;
-    counts.triangles = surface.diamonds.leaves << terrain.settings.lod.patch_depth;
-    counts.diamonds = surface.diamonds.pool.live();
+    let mut done = Refinement::default();
+    if mesh.diamonds.base().is_none()
+        && let Some(roots) = planet.pages.roots()
+    {
+        let base = mesh.create_base();
+        planet.follow_base(&mesh.diamonds, base, roots);
+    }
+    if mesh.diamonds.base().is_some() {
+        done = mesh.refine(&mut planet);
+        let most = terrain.settings.lod.wanted_max;
+        want::list(&mut mesh.lacking, planet.pages.room(planet.frame + 1).min(most), &mut output.wanted);
+    } else {
+        want::roots(planet.pages, &mut output.wanted);
+    }
+    count(&mut output.counts, mesh, &done, terrain.settings.lod.patch_depth);
+    output.counts.wanted = u32::try_from(output.wanted.len()).expect("a bounded list");
+    output.digest.mesh = planet.cover.digest();
+}
+
+fn count(counts: &mut FrameCounts, mesh: &Mesh, done: &Refinement, patch_depth: u8) {
+    counts.leaves = mesh.diamonds.leaves();
+    counts.triangles = counts.leaves << patch_depth;
+    counts.diamonds = mesh.diamonds.live();
     counts.splits = done.splits;
     counts.merges = done.merges;
+    counts.evaluations = done.evaluations;
     counts.blocked = done.blocked;
     counts.error_px_bound = done.error_px_bound;
-    counts.wanted = u32::try_from(output.wanted.len()).expect("a bounded list");
-    output.digest.mesh = surface.diamonds.digest();
 }
 
 /// Vertices of new leaves, in parallel over blocks of slots.
@@ -255,7 +295,9 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     output.built.clear();
     patches.drain_fresh(&mut output.built);
     let SceneSettings { body, sea, .. } = &terrain.settings;
-    let ground = Ground { diamonds: &lod.diamonds, pages: &pages, body, sea: *sea };
+    let Lod { mesh, cover, .. } = &*lod;
+    let diamonds = &mesh.diamonds;
+    let ground = Ground { diamonds, cover, pages: &pages, body, sea: *sea };
     let slots = &output.built;
     let used = &mut blocks[..slots.len().div_ceil(BLOCK)];
     team.for_each_chunk(used, 1, |first, chunk| {

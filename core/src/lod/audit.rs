@@ -1,12 +1,13 @@
 //! Checks of the whole surface, slow and obviously right: for tests, tools and suspicion.
 //!
-//! In:    diamonds, queues, pages, patches.
+//! In:    diamonds, agenda, cover, pages, patches.
 //! Out:   the first disagreement in words.
 //! Keeps: nothing.
 //! Not here: anything that a frame runs.
 
-use super::diamonds::{DiamondId, Diamonds, Node};
-use super::queues::{Queue, Queues};
+use super::cover::Cover;
+use super::diamonds::{DiamondId, Diamonds};
+use super::refine::Mesh;
 use crate::datasource::pages::Pages;
 use crate::geodesy::TwoFloat;
 use crate::lattice::{key_of, middle};
@@ -19,45 +20,39 @@ fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(what()) }
 }
 
-/// Links are symmetric, queues hold what they must, uses and leaves add up, free lists are right.
+/// Links are symmetric, seats are right, uses and leaves add up, the free list is right.
 ///
 /// # Errors
 /// The first disagreement.
 pub fn consistent(
-    diamonds: &Diamonds,
-    queues: &Queues,
+    mesh: &Mesh,
+    cover: &Cover,
     pages: &Pages,
     patches: &Patches,
 ) -> Result<(), String> {
-    let free = diamonds.pool.free();
-    let mut is_free = vec![false; diamonds.pool.used_end() as usize];
-    for id in free {
-        let place = &mut is_free[id.index() as usize];
-        ensure(!*place, || format!("{id:?} is twice in the free list"))?;
-        *place = true;
-    }
+    let diamonds = &mesh.diamonds;
+    mesh.agenda.check(diamonds)?;
+    let free = diamonds.free().count();
+    let (live, end) = (diamonds.live() as usize, diamonds.used_end() as usize);
+    ensure(free + live == end && diamonds.ids().count() == live, || {
+        format!("{free} free and {live} live records of {end}")
+    })?;
     let mut users: BTreeMap<u32, u32> = BTreeMap::new();
-    let (mut leaves, mut queued) = (0, [0; 4]);
+    let mut leaves = 0;
     for id in diamonds.ids() {
-        let node = &diamonds.node[id];
-        if is_free[id.index() as usize] {
-            let empty = queues.link[id].queue == Queue::None && node.pages == [None; 2];
-            ensure(empty, || format!("{id:?} is free and yet in use"))?;
-            continue;
-        }
         links(diamonds, id)?;
-        membership(queues, id, node, &mut queued)?;
         for side in 0..2 {
-            leaves += leaf(node, id, side, patches)?;
-            if let Some(page) = node.pages[side] {
+            leaves += leaf((diamonds, cover), id, side, patches)?;
+            let page = cover.pages[id][side];
+            let there = diamonds[id].has_side(side);
+            ensure(page.is_some() == there, || format!("{id:?} side {side} and {page:?}"))?;
+            if let Some(page) = page {
                 *users.entry(page.index()).or_default() += 1;
             }
         }
     }
-    ensure(queues.lengths() == queued, || {
-        format!("queues {:?} hold {queued:?}", queues.lengths())
-    })?;
-    ensure(leaves == diamonds.leaves, || format!("{} leaves, found {leaves}", diamonds.leaves))?;
+    let counted = diamonds.leaves();
+    ensure(leaves == counted, || format!("{counted} leaves, found {leaves}"))?;
     ensure(patches.live() == leaves, || format!("{} patches, {leaves} leaves", patches.live()))?;
     for (index, &count) in pages.users.as_slice().iter().enumerate() {
         let found = users.get(&u32::try_from(index).expect("u32")).copied().unwrap_or(0);
@@ -68,54 +63,43 @@ pub fn consistent(
 
 /// Parents know their kids, kids their parents; a record exists for a split parent's sake.
 fn links(diamonds: &Diamonds, id: DiamondId) -> Result<(), String> {
-    let node = &diamonds.node[id];
+    let (record, shape) = (&diamonds[id], diamonds.shape(id));
+    ensure(shape.centre() == record.centre(), || format!("{id:?} is not where it is"))?;
     for side in 0..2 {
-        let Some(parent) = node.parents[side] else {
-            ensure(node.shape.level == 0, || format!("{id:?} has no parent {side}"))?;
+        let Some(parent) = record.parents()[side] else {
+            ensure(record.level() == 0, || format!("{id:?} has no parent {side}"))?;
             continue;
         };
-        let over = &diamonds.node[parent];
-        let known = over.kids[usize::from(node.slots[side])] == Some(id);
+        let over = &diamonds[parent];
+        let known = over.kids()[record.slot(side)] == Some(id);
         ensure(known, || format!("{parent:?} does not know its kid {id:?}"))?;
-        ensure(over.split == node.has_side(side), || format!("{id:?} side {side} and {parent:?}"))?;
-        let apex = over.shape.centre() == node.shape.apexes[side];
-        ensure(apex, || format!("{id:?} side {side} does not end in its parent's centre"))?;
-        ensure(over.shape.level + 1 == node.shape.level, || format!("{id:?} skips a level"))?;
+        let agree = over.is_split() == record.has_side(side);
+        ensure(agree, || format!("{id:?} side {side} and {parent:?}"))?;
+        ensure(over.level() + 1 == record.level(), || format!("{id:?} skips a level"))?;
+        let corners = diamonds.shape(parent).corners();
+        let edge = [0, 1].map(|i| corners[(record.slot(side) + i) & 3]);
+        let fits = edge.contains(&shape.ends[0]) && edge.contains(&shape.ends[1]);
+        ensure(fits, || format!("{id:?} side {side} does not lie on its parent's edge"))?;
     }
-    ensure(node.has_side(0) || node.has_side(1), || format!("{id:?} has no side"))?;
-    ensure(!node.split || node.has_side(0) && node.has_side(1), || format!("{id:?} split alone"))?;
-    let kids = node.kids.iter().flatten();
-    let split_kids = kids.clone().filter(|&&kid| diamonds.node[kid].split).count();
-    ensure(split_kids == usize::from(node.split_kids), || format!("{id:?} miscounts split kids"))?;
-    ensure(!node.split || kids.count() == 4, || format!("{id:?} is split and lacks a kid"))
+    ensure(record.has_side(0) || record.has_side(1), || format!("{id:?} has no side"))?;
+    let whole = record.has_side(0) && record.has_side(1);
+    ensure(!record.is_split() || whole, || format!("{id:?} split alone"))?;
+    let kids = record.kids();
+    let split_kids = kids.iter().flatten().filter(|&&kid| diamonds[kid].is_split()).count();
+    let counted = usize::from(record.split_kids());
+    ensure(split_kids == counted, || format!("{id:?} miscounts split kids"))?;
+    let all = kids.iter().flatten().count() == 4;
+    ensure(!record.is_split() || all, || format!("{id:?} is split and lacks a kid"))
 }
 
-fn membership(
-    queues: &Queues,
+fn leaf(
+    (diamonds, cover): (&Diamonds, &Cover),
     id: DiamondId,
-    node: &Node,
-    queued: &mut [u32; 4],
-) -> Result<(), String> {
-    let queue = queues.link[id].queue;
-    let fits = match queue {
-        Queue::Split | Queue::Blocked | Queue::Deepest => !node.split,
-        Queue::Merge => node.split && node.split_kids == 0,
-        Queue::None => node.split && node.split_kids > 0,
-    };
-    ensure(fits, || format!("{id:?} is in queue {queue:?}: {node:?}"))?;
-    match queue {
-        Queue::Split => queued[0] += 1,
-        Queue::Merge => queued[1] += 1,
-        Queue::Blocked => queued[2] += 1,
-        Queue::Deepest => queued[3] += 1,
-        Queue::None => {}
-    }
-    Ok(())
-}
-
-fn leaf(node: &Node, id: DiamondId, side: usize, patches: &Patches) -> Result<u32, String> {
-    let is_leaf = node.has_side(side) && !node.split;
-    let slot = node.patches[side];
+    side: usize,
+    patches: &Patches,
+) -> Result<u32, String> {
+    let is_leaf = diamonds[id].has_side(side) && !diamonds[id].is_split();
+    let slot = cover.patches[id][side];
     ensure(slot.is_some() == is_leaf, || format!("{id:?} side {side}: leaf {is_leaf}, {slot:?}"))?;
     if let Some(slot) = slot {
         let owner = patches.leaf[slot as usize].map(|l| (l.diamond, usize::from(l.side)));
@@ -125,14 +109,14 @@ fn leaf(node: &Node, id: DiamondId, side: usize, patches: &Patches) -> Result<u3
 }
 
 /// Every small triangle of the drawn surface, as lattice points.
-pub fn triangles(diamonds: &Diamonds, patches: &Patches) -> Vec<[IVec3; 3]> {
+pub fn triangles(diamonds: &Diamonds, cover: &Cover, patches: &Patches) -> Vec<[IVec3; 3]> {
     let pattern = indices(patches.patch_depth);
     let mut all = Vec::new();
     for id in diamonds.ids() {
-        let node = &diamonds.node[id];
+        let shape = diamonds.shape(id);
         for side in 0..2 {
-            if node.patches[side].is_some() {
-                let points = lattice_points(node.shape.triangle(side), patches.patch_depth);
+            if cover.patches[id][side].is_some() {
+                let points = lattice_points(shape.triangle(side), patches.patch_depth);
                 all.extend(
                     pattern.chunks_exact(3).map(|t| [0, 1, 2].map(|i| points[t[i] as usize])),
                 );
@@ -157,8 +141,8 @@ pub fn lattice_points([apex, start, end]: [IVec3; 3], patch_depth: u8) -> Vec<IV
 ///
 /// # Errors
 /// The first edge or vertex that breaks it.
-pub fn closed(diamonds: &Diamonds, patches: &Patches) -> Result<(), String> {
-    let triangles = triangles(diamonds, patches);
+pub fn closed(diamonds: &Diamonds, cover: &Cover, patches: &Patches) -> Result<(), String> {
+    let triangles = triangles(diamonds, cover, patches);
     if triangles.is_empty() {
         return Ok(());
     }
@@ -183,16 +167,20 @@ pub fn closed(diamonds: &Diamonds, patches: &Patches) -> Result<(), String> {
     }
     let (v, e, f) = (vertices.len(), edges.len() / 2, triangles.len());
     ensure(v + f == e + 2, || format!("V − E + F = {v} − {e} + {f} is not 2"))?;
-    one_position_each(diamonds, patches)
+    one_position_each(diamonds, cover, patches)
 }
 
-fn one_position_each(diamonds: &Diamonds, patches: &Patches) -> Result<(), String> {
+fn one_position_each(
+    diamonds: &Diamonds,
+    cover: &Cover,
+    patches: &Patches,
+) -> Result<(), String> {
     let mut positions = Vec::new();
     for id in diamonds.ids() {
-        let node = &diamonds.node[id];
+        let shape = diamonds.shape(id);
         for side in 0..2 {
-            let Some(slot) = node.patches[side] else { continue };
-            let points = lattice_points(node.shape.triangle(side), patches.patch_depth);
+            let Some(slot) = cover.patches[id][side] else { continue };
+            let points = lattice_points(shape.triangle(side), patches.patch_depth);
             for (point, vertex) in points.into_iter().zip(patches.vertices_of(slot)) {
                 let TwoFloat { hi, lo } = vertex.position;
                 positions.push((key_of(point), hi.map(f32::to_bits), lo.map(f32::to_bits)));

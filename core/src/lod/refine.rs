@@ -1,199 +1,420 @@
-//! Stages `prioritise` and `refine`: every queued priority anew, then splits and merges until the
-//! tolerance is met, the budget is full and the queues agree, or the counts are spent.
+//! Refinement: what is due is judged, then splits and merges until the tolerance is met, the
+//! budget is full and both sides agree, or the counts are spent.
 //!
-//! In:    sights, resident pages, the knobs.
-//! Out:   the refined surface; wanted pages, the most urgent first; counts.
-//! Keeps: a scratch list of what blocked splits want.
-//! Not here: what one operation changes (`operate`).
+//! In:    a [`Rule`], the motion since the last frame, the knobs.
+//! Out:   the refined surface; what blocked splits lack; counts.
+//! Keeps: [`Mesh`]: diamonds, agenda, lists of fixed capacity.
+//! Not here: where priorities come from (`screen_error`), what hangs on diamonds (`cover`).
+//!
+//! The mesh after a frame is the one that judging every diamond would give. Below the tolerance
+//! this needs no order. In the budget it does, and there is one: by priority, level and key, so
+//! that no two diamonds tie. A certain leaf is below the leaf threshold and a certain parent above
+//! the parent threshold; before a choice could depend on them, the threshold is moved and those
+//! that may have been passed are judged.
 
-use super::diamonds::{Diamond, DiamondId, Diamonds};
-use super::operate::Surface;
-use super::queues::{Queue, Queues};
-use super::screen_error::{Sight, priority_px};
-use crate::columns::Id;
+use super::agenda::{Agenda, Band, Verdict};
+use super::diamonds::{DiamondId, Diamonds, Role, Seat};
+use super::wheel::Motion;
 use crate::datasource::PageKey;
 use core::cmp::Ordering;
 
-/// Diamonds in one chunk of the priority pass: some 5 µs of work.
-pub const PRIORITY_GRAIN: usize = 512;
+/// Verdicts computed together.
+const BLOCK: usize = 8192;
 
-/// What `refine` keeps between frames, only to allocate nothing.
-pub struct Scratch {
-    wants: Vec<(f64, PageKey)>,
-    chain: Vec<DiamondId>,
+/// Share of a threshold by which the thresholds enclose the priority where both sides meet: more
+/// of it means more urgent diamonds, less of it more moves of the thresholds.
+const MARGIN: f64 = 0.01;
+
+/// Where priorities come from and what hangs on diamonds: the planet, or a workload.
+pub trait Rule: Sync {
+    /// Judges a leaf or a parent against its threshold.
+    fn judge(&self, diamonds: &Diamonds, id: DiamondId, band: Band) -> Verdict;
+
+    /// Whether the kids of `id` could be made now.
+    ///
+    /// # Errors
+    /// The page that is lacking.
+    fn kids_ready(&self, diamonds: &Diamonds, id: DiamondId) -> Result<(), PageKey>;
+
+    /// Called after `id` was split.
+    fn follow_split(&mut self, diamonds: &Diamonds, id: DiamondId);
+
+    /// Called before `id` is merged.
+    fn prepare_merge(&mut self, diamonds: &Diamonds, id: DiamondId);
 }
 
-/// Counts of one `refine`.
+/// What bounds one frame's refinement.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Knobs {
+    /// Error on the screen that may stay, pixels.
+    pub tolerance_px: f64,
+    /// Most leaf triangles.
+    pub leaves_max: u32,
+    /// Most splits in one frame.
+    pub splits_max: u32,
+    /// Most merges in one frame.
+    pub merges_max: u32,
+    /// Leaves of this level are not split.
+    pub level_max: u8,
+}
+
+/// Counts of one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Refinement {
     /// Diamonds split, forced ones included.
     pub splits: u32,
     /// Diamonds merged.
     pub merges: u32,
+    /// Diamonds judged.
+    pub evaluations: u32,
     /// Splits that waited for a page.
     pub blocked: u32,
-    /// Bound of the worst leaf, in pixels.
+    /// No leaf is worse than this, in pixels: the tolerance where it decides.
     pub error_px_bound: f64,
 }
 
-impl Scratch {
-    /// Room for as many blocked splits as there can be diamonds.
-    pub fn new(diamonds: u32) -> Self {
-        Self { wants: Vec::with_capacity(diamonds as usize), chain: Vec::with_capacity(128) }
-    }
+/// The surface and its agenda.
+pub struct Mesh {
+    /// Every diamond with a record.
+    pub diamonds: Diamonds,
+    /// When to look at which.
+    pub agenda: Agenda,
+    /// What blocked splits of this frame lack, with their priorities.
+    pub lacking: Vec<(f64, PageKey)>,
+    knobs: Knobs,
+    done: Refinement,
+    frame: u32,
+    chain: Vec<DiamondId>,
+    /// Split or merged in this frame: judged at its end, since they cannot change again in it.
+    late: Vec<DiamondId>,
+    verdicts: Vec<Verdict>,
+    /// Worst urgent leaf that is too deep to be split.
+    deepest_px: f64,
+    /// Worst leaf that waits.
+    waiting_px: f64,
 }
 
-/// Priorities of one chunk of the pool: diamonds `first ..` as many as `out` is long.
-pub fn prioritise_chunk(
-    diamonds: (&Queues, &[super::screen_error::Region]),
-    sights: &[Sight],
-    first: usize,
-    out: &mut [f64],
-) {
-    let (queues, regions) = diamonds;
-    for (offset, priority) in out.iter_mut().enumerate() {
-        let index = first + offset;
-        let id = Id::<Diamond>::new(u32::try_from(index).expect("the pool is counted in u32"));
-        if queues.link[id].queue != Queue::None {
-            *priority = priority_px(&regions[index], sights);
+/// Spreads a pass over a column of verdicts: `spread(column, body)` calls `body` with the index of
+/// each chunk's first element and the chunk.
+pub type Spread<'a> = &'a dyn Fn(&mut [Verdict], &(dyn Fn(usize, &mut [Verdict]) + Sync));
+
+impl Mesh {
+    /// An empty mesh; every list is allocated here.
+    pub fn new(capacity: u32, knobs: Knobs) -> Self {
+        let operations = knobs.splits_max.saturating_add(knobs.merges_max).min(capacity) as usize;
+        Self {
+            diamonds: Diamonds::new(capacity),
+            agenda: Agenda::new(capacity, knobs.tolerance_px),
+            lacking: Vec::with_capacity(capacity as usize),
+            knobs,
+            done: Refinement::default(),
+            frame: 0,
+            chain: Vec::with_capacity(128),
+            late: Vec::with_capacity(operations),
+            verdicts: vec![Verdict::Urgent(0.0); BLOCK.min(capacity as usize)],
+            deepest_px: 0.0,
+            waiting_px: 0.0,
         }
     }
-}
 
-/// After the pass: every diamond to the bucket of its new priority; blocked ones may try again.
-/// Returns how many priorities were computed.
-pub fn settle(diamonds: &Diamonds, queues: &mut Queues) -> u32 {
-    let evaluations = queues.lengths().into_iter().sum();
-    while let Some(id) = queues.first_blocked() {
-        queues.remove(id);
-        queues.insert(id, Queue::Split, diamonds.priority_px[id]);
+    /// Creates the base over which everything follows.
+    pub fn create_base(&mut self) -> [DiamondId; 4] {
+        let base = self.diamonds.create_base();
+        self.late.extend(base);
+        base
     }
-    for id in diamonds.ids() {
-        queues.rebucket(id, diamonds.priority_px[id]);
-    }
-    evaluations
-}
 
-/// Stage `refine`. Merges come first and have a count of their own, so splits cannot starve them.
-pub fn refine(
-    surface: &mut Surface<'_>,
-    leaves_max: u32,
-    scratch: &mut Scratch,
-    wanted: &mut Vec<PageKey>,
-) -> Refinement {
-    let mut done = Refinement::default();
-    scratch.wants.clear();
-    if surface.diamonds.base.is_none() {
-        match surface.pages.roots() {
-            Some(roots) => surface.create_base(roots),
-            None => return want_roots(surface, wanted, done),
+    /// First half of a frame: judges what the motion made due, `None` being all there is.
+    pub fn prioritise(
+        &mut self,
+        judge: &(impl Fn(&Diamonds, DiamondId, Band) -> Verdict + Sync),
+        motion: Option<Motion>,
+        spread: Spread<'_>,
+    ) -> u32 {
+        self.frame = self.frame.wrapping_add(1);
+        self.done = Refinement::default();
+        if motion.is_none_or(|motion| !motion.is_none()) {
+            self.deepest_px = 0.0;
+        }
+        self.agenda.start(&mut self.diamonds, motion);
+        self.judge_due(judge, spread);
+        self.done.evaluations
+    }
+
+    fn judge_due(
+        &mut self,
+        judge: &(impl Fn(&Diamonds, DiamondId, Band) -> Verdict + Sync),
+        spread: Spread<'_>,
+    ) {
+        let due = self.agenda.take_due();
+        let mut verdicts = core::mem::take(&mut self.verdicts);
+        let band = self.agenda.band();
+        for ids in due.chunks(BLOCK) {
+            let verdicts = &mut verdicts[..ids.len()];
+            let diamonds = &self.diamonds;
+            spread(verdicts, &|first, chunk| {
+                for (verdict, &id) in chunk.iter_mut().zip(&ids[first..]) {
+                    *verdict = judge(diamonds, id, band);
+                }
+            });
+            ids.iter().zip(verdicts).for_each(|(&id, &mut verdict)| self.seat(id, verdict));
+        }
+        self.done.evaluations += u32::try_from(due.len()).expect("diamonds are counted in u32");
+        self.verdicts = verdicts;
+        self.agenda.judged(due);
+    }
+
+    fn seat(&mut self, id: DiamondId, verdict: Verdict) {
+        if let Verdict::Urgent(priority_px) = verdict {
+            let record = &self.diamonds[id];
+            if record.level() >= self.knobs.level_max && !record.is_split() {
+                self.deepest_px = self.deepest_px.max(priority_px);
+                self.agenda.seat_soon(&mut self.diamonds, id);
+                return;
+            }
+        }
+        self.agenda.seat(&mut self.diamonds, id, verdict);
+    }
+
+    fn judge(&mut self, rule: &impl Rule, id: DiamondId) {
+        let verdict = rule.judge(&self.diamonds, id, self.agenda.band());
+        self.done.evaluations += 1;
+        self.seat(id, verdict);
+    }
+
+    /// Second half of a frame. Merges come first and have a count of their own, so that splits
+    /// cannot starve them, at any speed.
+    pub fn refine(&mut self, rule: &mut impl Rule) -> Refinement {
+        self.lacking.clear();
+        self.waiting_px = 0.0;
+        self.judge_late(rule);
+        self.merge_needless(rule);
+        while self.done.splits < self.knobs.splits_max {
+            if !self.split_first(rule) {
+                break;
+            }
+        }
+        self.judge_late(rule);
+        self.relax_thresholds();
+        self.done.error_px_bound = self.error_px_bound();
+        self.done
+    }
+
+    /// Judges what was split or merged; some of it may be gone or seated by now.
+    fn judge_late(&mut self, rule: &impl Rule) {
+        let mut late = core::mem::take(&mut self.late);
+        for &id in &late {
+            let record = &self.diamonds[id];
+            if record.seat == Seat::None && record.role() != Role::Interior {
+                self.judge(rule, id);
+            }
+        }
+        late.clear();
+        self.late = late;
+    }
+
+    /// Merges what the tolerance does not ask for: one exact threshold, no hysteresis.
+    fn merge_needless(&mut self, rule: &mut impl Rule) {
+        while self.done.merges < self.knobs.merges_max {
+            let Some(id) = self.agenda.first_parent(&mut self.diamonds) else { break };
+            if self.agenda.priority_px[id] > self.knobs.tolerance_px {
+                break;
+            }
+            self.merge(rule, id);
         }
     }
-    merge_needless(surface, &mut done);
-    while done.splits < surface.lod.splits_max {
-        if !split_first(surface, leaves_max, scratch, &mut done) {
-            break;
+
+    /// Splits the first of the urgent leaves, with its ancestors; where the budget is full, merges
+    /// the least parent for it while that is worth less. False when nothing more can be done.
+    fn split_first(&mut self, rule: &mut impl Rule) -> bool {
+        let Some(id) = self.agenda.first_leaf(&mut self.diamonds) else {
+            return self.look_deeper(rule, 0.0);
+        };
+        let priority_px = self.agenda.priority_px[id];
+        if priority_px < self.agenda.band().leaf_px {
+            return self.look_deeper(rule, priority_px);
+        }
+        match self.plan(rule, id) {
+            Err(lacking) => {
+                self.lacking.push((priority_px, lacking));
+                self.done.blocked += 1;
+                self.wait(id);
+                return true;
+            }
+            // Merged in this frame: not split in it. It waits as if for a page.
+            Ok(()) if self.chain.iter().any(|&id| self.diamonds[id].is_touched(self.frame)) => {
+                self.wait(id);
+                return true;
+            }
+            Ok(()) => {}
+        }
+        let cost = u32::try_from(self.chain.len()).expect("a chain is as long as there are levels");
+        if self.done.splits + cost > self.knobs.splits_max {
+            return false;
+        }
+        if self.diamonds.leaves() + 2 * cost > self.knobs.leaves_max {
+            return self.make_room(rule, id);
+        }
+        for at in 0..self.chain.len() {
+            self.split(rule, self.chain[at]);
+        }
+        true
+    }
+
+    fn wait(&mut self, id: DiamondId) {
+        self.waiting_px = self.waiting_px.max(self.agenda.priority_px[id]);
+        self.agenda.wait(&mut self.diamonds, id);
+    }
+
+    /// No known leaf is as urgent as the threshold says. Lowers it where certain leaves below it
+    /// could be split. False if they could not.
+    fn look_deeper(&mut self, rule: &impl Rule, known_px: f64) -> bool {
+        let judge = |diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band);
+        let Band { leaf_px, parent_px } = self.agenda.band();
+        let floor_px = self.knobs.tolerance_px.next_up();
+        if leaf_px <= floor_px {
+            return false;
+        }
+        let mut to_px = leaf_px * (1.0 - 2.0 * MARGIN);
+        if self.diamonds.leaves() + 2 > self.knobs.leaves_max {
+            if self.done.merges >= self.knobs.merges_max {
+                return false;
+            }
+            let least_px = self.least_parent_px();
+            if least_px > parent_px && parent_px < leaf_px {
+                // A certain parent might be worth less than a certain leaf.
+                self.agenda.raise_parent_threshold(leaf_px);
+                self.judge_due(&judge, ALONE);
+                return true;
+            }
+            if least_px >= leaf_px {
+                return false;
+            }
+            to_px = to_px.min(least_px * (1.0 - MARGIN));
+        }
+        to_px = if known_px > 0.0 { to_px.max(known_px.min(leaf_px)) } else { to_px };
+        self.agenda.lower_leaf_threshold(to_px.max(floor_px));
+        self.judge_due(&judge, ALONE);
+        true
+    }
+
+    /// Merges the least parent if it is worth less than `top`, which wants the room.
+    fn make_room(&mut self, rule: &mut impl Rule, top: DiamondId) -> bool {
+        if self.done.merges >= self.knobs.merges_max {
+            return false;
+        }
+        let rank = self.agenda.rank(&self.diamonds, top);
+        let least_px = self.least_parent_px();
+        let Band { parent_px, .. } = self.agenda.band();
+        if least_px > parent_px && rank.priority_px > parent_px {
+            // A certain parent might be the least and worth less.
+            self.agenda.raise_parent_threshold(rank.priority_px * (1.0 + MARGIN));
+            self.judge_due(&|diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band), ALONE);
+            return true;
+        }
+        let Some(least) = self.agenda.first_parent(&mut self.diamonds) else { return false };
+        let needed = self.diamonds[top].parents().contains(&Some(least));
+        let overlap = self.agenda.rank(&self.diamonds, least).order(&rank) == Ordering::Less;
+        if needed || !overlap {
+            return false;
+        }
+        self.merge(rule, least);
+        true
+    }
+
+    /// Priority of the least urgent parent.
+    fn least_parent_px(&mut self) -> f64 {
+        let least = self.agenda.first_parent(&mut self.diamonds);
+        least.map_or(f64::INFINITY, |id| self.agenda.priority_px[id])
+    }
+
+    /// Where the budget binds, the thresholds enclose the priority at which both sides meet, no
+    /// wider than need be; otherwise they return to the tolerance.
+    fn relax_thresholds(&mut self) {
+        let Band { leaf_px, parent_px } = self.agenda.band();
+        let tolerance_px = self.knobs.tolerance_px;
+        let full = self.diamonds.leaves() + 2 > self.knobs.leaves_max;
+        let first = self.agenda.first_leaf(&mut self.diamonds);
+        let first_px = first.map_or(0.0, |id| self.agenda.priority_px[id]);
+        if !full {
+            self.agenda.relax(Band { leaf_px, parent_px: tolerance_px });
+            return;
+        }
+        let meet_px = first_px.max(leaf_px);
+        let below_px = meet_px * (1.0 - MARGIN);
+        let above_px = (meet_px * (1.0 + MARGIN)).max(tolerance_px);
+        self.agenda.relax(Band {
+            leaf_px: if leaf_px < below_px * (1.0 - MARGIN) { below_px } else { leaf_px },
+            parent_px: if parent_px > above_px * (1.0 + MARGIN) { above_px } else { parent_px },
+        });
+    }
+
+    fn error_px_bound(&mut self) -> f64 {
+        let first = self.agenda.first_leaf(&mut self.diamonds);
+        let first_px = first.map_or(0.0, |id| self.agenda.priority_px[id]);
+        let leaf_px = self.agenda.band().leaf_px;
+        let tolerance_px = self.knobs.tolerance_px;
+        let certain_px = if leaf_px > tolerance_px.next_up() { leaf_px } else { tolerance_px };
+        certain_px.max(first_px).max(self.waiting_px).max(self.deepest_px)
+    }
+
+    /// The diamonds to split so that `id` is: ancestors first, `id` last, into `chain`.
+    fn plan(&mut self, rule: &impl Rule, id: DiamondId) -> Result<(), PageKey> {
+        self.chain.clear();
+        plan(&self.diamonds, rule, id, &mut self.chain)
+    }
+
+    fn split(&mut self, rule: &mut impl Rule, id: DiamondId) {
+        self.agenda.unseat(&mut self.diamonds, id);
+        let parents = self.diamonds[id].parents();
+        for parent in parents.into_iter().flatten() {
+            self.agenda.unseat(&mut self.diamonds, parent);
+        }
+        self.diamonds.split(id, self.frame);
+        rule.follow_split(&self.diamonds, id);
+        for kid in self.diamonds[id].kids().into_iter().flatten() {
+            let record = &self.diamonds[kid];
+            // A kid merged in this frame cannot be split in it.
+            if record.seat == Seat::None && !record.is_touched(self.frame) {
+                self.judge(rule, kid);
+            }
+        }
+        self.late.push(id);
+        self.done.splits += 1;
+    }
+
+    fn merge(&mut self, rule: &mut impl Rule, id: DiamondId) {
+        self.agenda.unseat(&mut self.diamonds, id);
+        rule.prepare_merge(&self.diamonds, id);
+        let agenda = &mut self.agenda;
+        self.diamonds.merge(id, self.frame, |diamonds, kid| agenda.unseat(diamonds, kid));
+        let parents = self.diamonds[id].parents();
+        for parent in parents.into_iter().flatten() {
+            let touched = self.diamonds[parent].is_touched(self.frame);
+            if self.diamonds[parent].role() == Role::Parent && !touched {
+                self.judge(rule, parent);
+            }
+        }
+        self.late.push(id);
+        self.done.merges += 1;
+    }
+}
+
+/// A pass on this thread.
+pub const ALONE: Spread<'static> = &|column, body| body(0, column);
+
+fn plan(
+    diamonds: &Diamonds,
+    rule: &impl Rule,
+    id: DiamondId,
+    chain: &mut Vec<DiamondId>,
+) -> Result<(), PageKey> {
+    for parent in diamonds[id].parents().into_iter().flatten() {
+        if !diamonds[parent].is_split() && !chain.contains(&parent) {
+            plan(diamonds, rule, parent, chain)?;
         }
     }
-    done.error_px_bound = surface.queues.worst_px(|id| surface.rank(id));
-    list_wanted(surface, scratch, wanted);
-    done
-}
-
-fn want_roots(surface: &Surface<'_>, wanted: &mut Vec<PageKey>, done: Refinement) -> Refinement {
-    let roots = (0..4).map(PageKey::root);
-    wanted.extend(roots.filter(|&key| surface.pages.find(key).is_none()));
-    done
-}
-
-/// The least diamond of the merge queue that was not touched in this frame.
-fn first_to_merge(surface: &Surface<'_>) -> Option<DiamondId> {
-    let untouched = |id| surface.diamonds.node[id].touched != surface.frame;
-    surface.queues.first_to_merge(|id| surface.rank(id), untouched)
-}
-
-/// Merges what the tolerance does not ask for: one exact threshold, no hysteresis.
-fn merge_needless(surface: &mut Surface<'_>, done: &mut Refinement) {
-    while done.merges < surface.lod.merges_max {
-        let Some(id) = first_to_merge(surface) else { break };
-        if surface.diamonds.priority_px[id] > surface.lod.tolerance.0 {
-            break;
-        }
-        surface.merge(id);
-        done.merges += 1;
-    }
-}
-
-/// Splits the first of the split queue, with its ancestors; where the budget is full, merges the
-/// least of the merge queue for it while that is worth less. False when nothing more can be done.
-fn split_first(
-    surface: &mut Surface<'_>,
-    leaves_max: u32,
-    scratch: &mut Scratch,
-    done: &mut Refinement,
-) -> bool {
-    let Some(id) = surface.queues.first_to_split(|id| surface.rank(id)) else { return false };
-    let rank = surface.rank(id);
-    if rank.priority_px <= surface.lod.tolerance.0 {
-        return false;
-    }
-    if let Err(lacking) = surface.plan_split(id, &mut scratch.chain) {
-        scratch.wants.push((rank.priority_px, lacking));
-        surface.queues.remove(id);
-        surface.queues.insert(id, Queue::Blocked, rank.priority_px);
-        done.blocked += 1;
-        return true;
-    }
-    let touched = |&id: &DiamondId| surface.diamonds.node[id].touched == surface.frame;
-    if scratch.chain.iter().any(touched) {
-        // Merged in this frame: not split in it. It waits as if for a page.
-        surface.queues.remove(id);
-        surface.queues.insert(id, Queue::Blocked, rank.priority_px);
-        return true;
-    }
-    let cost = u32::try_from(scratch.chain.len()).expect("a chain is as long as there are levels");
-    if done.splits + cost > surface.lod.splits_max {
-        return false;
-    }
-    if surface.diamonds.leaves + 2 * cost > leaves_max {
-        return make_room(surface, id, done);
-    }
-    for &ancestor in &scratch.chain {
-        surface.split(ancestor);
-    }
-    done.splits += cost;
-    true
-}
-
-/// Merges the least diamond if it is worth less than `top`, which wants the room.
-fn make_room(surface: &mut Surface<'_>, top: DiamondId, done: &mut Refinement) -> bool {
-    if done.merges >= surface.lod.merges_max {
-        return false;
-    }
-    let Some(least) = first_to_merge(surface) else { return false };
-    let needed = surface.diamonds.node[top].parents.contains(&Some(least));
-    let overlap = surface.rank(least).order(&surface.rank(top)) == Ordering::Less;
-    if needed || !overlap {
-        return false;
-    }
-    surface.merge(least);
-    done.merges += 1;
-    true
-}
-
-/// The most urgent pages, once each, no more than can be taken in.
-fn list_wanted(surface: &Surface<'_>, scratch: &mut Scratch, wanted: &mut Vec<PageKey>) {
-    if scratch.wants.is_empty() {
-        return;
-    }
-    scratch.wants.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let room = surface.pages.room(surface.frame + 1).min(surface.lod.wanted_max) as usize;
-    for &(_, key) in &scratch.wants {
-        if wanted.len() >= room {
-            break;
-        }
-        if !wanted.contains(&key) {
-            wanted.push(key);
-        }
-    }
+    rule.kids_ready(diamonds, id)?;
+    chain.push(id);
+    Ok(())
 }

@@ -13,6 +13,7 @@ use crate::datasource::pages::Pages;
 use crate::digest::{Chain, mix};
 use crate::geodesy::{Ecef, Ellipsoid, TwoFloat};
 use crate::lattice::normal_of;
+use crate::lod::cover::Cover;
 use crate::lod::Diamonds;
 use crate::lod::diamonds::leaf_key;
 use glam::{DVec3, IVec3};
@@ -39,6 +40,8 @@ impl Block {
 pub struct Ground<'a> {
     /// The diamonds whose leaves are built.
     pub diamonds: &'a Diamonds,
+    /// Their pages.
+    pub cover: &'a Cover,
     /// The resident pages.
     pub pages: &'a Pages,
     /// The body's shape.
@@ -53,11 +56,10 @@ pub fn build_block(ground: &Ground<'_>, patches: &Patches, slots: &[u32], block:
     let targets = block.vertices.chunks_exact_mut(per_patch).zip(&mut block.built);
     for (&slot, (vertices, built)) in slots.iter().zip(targets) {
         let leaf = patches.leaf[slot as usize].expect("only live slots are built");
-        let node = &ground.diamonds.node[Id::new(leaf.diamond)];
-        let side = usize::from(leaf.side);
-        let page = ground.pages.get(node.pages[side].expect("a leaf's side is there"));
-        let triangle = node.shape.triangle(side);
-        let key = leaf_key(node.key, side);
+        let (id, side) = (Id::new(leaf.diamond), usize::from(leaf.side));
+        let page = ground.pages.get(ground.cover.pages[id][side].expect("a leaf's side is there"));
+        let triangle = ground.diamonds.shape(id).triangle(side);
+        let key = leaf_key(ground.diamonds[id].key(), side);
         *built = build_patch(ground, page, (triangle, key), (patches.patch_depth, vertices));
     }
 }

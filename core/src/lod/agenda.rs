@@ -1,0 +1,257 @@
+//! The agenda: which diamonds must be looked at in a frame, and which can wait for how much motion.
+//!
+//! In:    verdicts; motions of the views; moves of the two thresholds.
+//! Out:   diamonds that are due; the first urgent leaf and the first urgent parent.
+//! Keeps: a seat for every leaf and parent: in a wheel, among the urgent, soon or waiting.
+//! Not here: what a verdict is made from (`screen_error`), what is done then (`refine`).
+//!
+//! Two thresholds make the verdicts. A leaf is certain while its priority is below `leaf_px`: it
+//! is not split. A parent is certain while its priority is above `parent_px`: it is not merged.
+//! All others are urgent: their priorities are exact in every frame. Where the tolerance decides,
+//! both thresholds are the tolerance; where the budget does, they enclose the priority at which
+//! splits and merges meet, and follow it.
+
+use super::bins::Bins;
+use super::diamonds::{Diamond, DiamondId, Diamonds, Role, Seat};
+use super::urgent::{Rank, Seating, URGENT_BINS, Urgent};
+use super::wheel::{Lasts, Motion, WHEEL_BINS, Wheels};
+use crate::columns::Column;
+use core::cmp::Ordering;
+
+/// The two thresholds, in pixels.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Band {
+    /// A leaf below it is certain.
+    pub leaf_px: f64,
+    /// A parent above it is certain.
+    pub parent_px: f64,
+}
+
+/// What a rule says of a diamond.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Verdict {
+    /// Its priority matters: this is it, in pixels.
+    Urgent(f64),
+    /// It stays as it is for so long.
+    Certain(Lasts),
+}
+
+const URGENT_LEAVES: u32 = WHEEL_BINS;
+const URGENT_PARENTS: u32 = URGENT_LEAVES + URGENT_BINS;
+/// Due with the next motion, however small.
+const SOON: u32 = URGENT_PARENTS + URGENT_BINS;
+/// Urgent leaves that cannot be split in this frame: tried again in the next.
+const WAITING: u32 = SOON + 1;
+
+/// Seats, thresholds and odometers.
+pub struct Agenda {
+    /// Exact priorities of urgent diamonds in pixels; stale for all others.
+    pub priority_px: Column<Diamond, f64>,
+    band: Band,
+    bins: Bins,
+    wheels: Wheels,
+    leaves: Urgent,
+    parents: Urgent,
+    due: Vec<DiamondId>,
+}
+
+macro_rules! seating {
+    ($agenda:ident, $diamonds:ident) => {
+        &mut Seating {
+            diamonds: $diamonds,
+            bins: &mut $agenda.bins,
+            priority_px: &$agenda.priority_px,
+        }
+    };
+}
+
+impl Agenda {
+    /// Nobody is seated; both thresholds are at the tolerance.
+    pub fn new(capacity: u32, tolerance_px: f64) -> Self {
+        Self {
+            priority_px: Column::new(capacity, || 0.0),
+            band: Band { leaf_px: tolerance_px.next_up(), parent_px: tolerance_px },
+            bins: Bins::new(WAITING + 1, capacity),
+            wheels: Wheels::new(),
+            leaves: Urgent::new(URGENT_LEAVES, Ordering::Greater, capacity),
+            parents: Urgent::new(URGENT_PARENTS, Ordering::Less, capacity),
+            due: Vec::with_capacity(capacity as usize),
+        }
+    }
+
+    /// The thresholds.
+    pub fn band(&self) -> Band {
+        self.band
+    }
+
+    /// Starts a frame: what the motion may have changed becomes due; without motion, waiting
+    /// leaves are urgent again as they were. `None` is a motion that may have changed anything.
+    pub fn start(&mut self, diamonds: &mut Diamonds, motion: Option<Motion>) {
+        debug_assert!(self.due.is_empty());
+        let Self { bins, wheels, due, .. } = self;
+        if motion.is_some_and(|motion| motion.is_none()) {
+            self.bins.drain(WAITING, &mut self.due);
+            while let Some(id) = self.due.pop() {
+                self.seat(diamonds, id, Verdict::Urgent(self.priority_px[id]));
+            }
+            return;
+        }
+        if let Some(motion) = motion {
+            wheels.advance(&motion);
+            wheels.pass(|bin| bins.drain(bin, due));
+        } else {
+            wheels.pass_all(|bin| bins.drain(bin, due));
+        }
+        bins.drain(SOON, due);
+        bins.drain(WAITING, due);
+        self.leaves.drain(seating!(self, diamonds), &mut self.due);
+        self.parents.drain(seating!(self, diamonds), &mut self.due);
+    }
+
+    /// Lowers the threshold of leaves; those that may now be above it become due.
+    pub fn lower_leaf_threshold(&mut self, to_px: f64) {
+        self.wheels.leaf_threshold_fell(self.band.leaf_px, to_px);
+        self.band.leaf_px = to_px;
+        self.collect();
+    }
+
+    /// Raises the threshold of parents; those that may now be below it become due.
+    pub fn raise_parent_threshold(&mut self, to_px: f64) {
+        self.wheels.parent_threshold_rose(self.band.parent_px, to_px);
+        self.band.parent_px = to_px;
+        self.collect();
+    }
+
+    /// Moves both thresholds apart from each other's side: what was certain stays so.
+    ///
+    /// # Panics
+    /// In debug builds, if the leaf threshold falls or the parent threshold rises.
+    pub fn relax(&mut self, band: Band) {
+        debug_assert!(band.leaf_px >= self.band.leaf_px && band.parent_px <= self.band.parent_px);
+        self.band = band;
+    }
+
+    fn collect(&mut self) {
+        let Self { bins, wheels, due, .. } = self;
+        wheels.pass(|bin| bins.drain(bin, due));
+        bins.drain(SOON, due);
+    }
+
+    /// The diamonds to be judged now; give the list back to [`Self::judged`].
+    pub fn take_due(&mut self) -> Vec<DiamondId> {
+        core::mem::take(&mut self.due)
+    }
+
+    /// Takes the memory of the list back.
+    pub fn judged(&mut self, mut due: Vec<DiamondId>) {
+        due.clear();
+        self.due = due;
+    }
+
+    /// Seats a leaf or a parent that is nowhere, or was just drained from where it was.
+    pub fn seat(&mut self, diamonds: &mut Diamonds, id: DiamondId, verdict: Verdict) {
+        match verdict {
+            Verdict::Certain(lasts) => {
+                let bin = self.wheels.book(&lasts).unwrap_or(SOON);
+                self.bins.push(diamonds, bin, id);
+            }
+            Verdict::Urgent(priority_px) => {
+                self.priority_px[id] = priority_px;
+                let is_leaf = diamonds[id].role() == Role::Leaf;
+                let set = if is_leaf { &mut self.leaves } else { &mut self.parents };
+                set.push(seating!(self, diamonds), id);
+            }
+        }
+    }
+
+    /// Seats a diamond that is to be judged again with the next motion, whatever it says now.
+    pub fn seat_soon(&mut self, diamonds: &mut Diamonds, id: DiamondId) {
+        self.bins.push(diamonds, SOON, id);
+    }
+
+    /// Moves an urgent leaf to those that are tried again in the next frame.
+    pub fn wait(&mut self, diamonds: &mut Diamonds, id: DiamondId) {
+        self.unseat(diamonds, id);
+        self.bins.push(diamonds, WAITING, id);
+    }
+
+    /// Takes a diamond from its seat, if it has one.
+    pub fn unseat(&mut self, diamonds: &mut Diamonds, id: DiamondId) {
+        match diamonds[id].seat {
+            Seat::Free | Seat::None => {}
+            Seat::Front => {
+                let is_leaf = diamonds[id].role() == Role::Leaf;
+                let set = if is_leaf { &mut self.leaves } else { &mut self.parents };
+                set.remove_from_front(seating!(self, diamonds), id);
+            }
+            Seat::Bin => {
+                let bin = self.bins.remove(diamonds, id);
+                if self.bins.is_empty(bin) {
+                    self.emptied(bin);
+                }
+            }
+        }
+    }
+
+    fn emptied(&mut self, bin: u32) {
+        if bin < WHEEL_BINS {
+            self.wheels.emptied(bin);
+        } else if self.leaves.owns(bin) {
+            self.leaves.emptied(bin);
+        } else if self.parents.owns(bin) {
+            self.parents.emptied(bin);
+        }
+    }
+
+    /// The urgent leaf with the greatest priority.
+    pub fn first_leaf(&mut self, diamonds: &mut Diamonds) -> Option<DiamondId> {
+        self.leaves.first(seating!(self, diamonds))
+    }
+
+    /// The urgent parent with the least priority.
+    pub fn first_parent(&mut self, diamonds: &mut Diamonds) -> Option<DiamondId> {
+        self.parents.first(seating!(self, diamonds))
+    }
+
+    /// The standing of an urgent diamond.
+    pub fn rank(&self, diamonds: &Diamonds, id: DiamondId) -> Rank {
+        let record = &diamonds[id];
+        let priority_px = self.priority_px[id];
+        Rank { priority_px, level: record.level(), key: record.key() }
+    }
+
+    /// Bytes in use besides the records: priorities, bins, lists.
+    pub fn bytes(&self, diamonds: u32) -> usize {
+        let per_diamond = size_of::<f64>() + 3 * size_of::<DiamondId>();
+        diamonds as usize * per_diamond + self.bins.bytes()
+    }
+
+    /// Whether every seat is where the diamond says, each once, and marked as in use; for checks.
+    ///
+    /// # Errors
+    /// The first disagreement in words.
+    pub fn check(&self, diamonds: &Diamonds) -> Result<(), String> {
+        let mut seated = vec![false; diamonds.used_end() as usize];
+        let wheels = self.wheels.in_use().flat_map(|bin| self.bins.content(bin));
+        let rest = [SOON, WAITING].into_iter().flat_map(|bin| self.bins.content(bin));
+        let urgent = [&self.leaves, &self.parents].map(|set| set.content(&self.bins));
+        for id in wheels.chain(rest).chain(urgent.into_iter().flatten()) {
+            let record = &diamonds[id];
+            let there = match record.seat {
+                Seat::Bin => self.bins.holds(record.place, id),
+                Seat::Front => true,
+                Seat::None | Seat::Free => false,
+            };
+            let again = core::mem::replace(&mut seated[id.index() as usize], true);
+            if !there || again || record.role() == Role::Interior {
+                return Err(format!("{id:?} sits wrongly or twice: {record:?}"));
+            }
+        }
+        match diamonds.ids().find(|&id| {
+            (diamonds[id].role() != Role::Interior) != seated[id.index() as usize]
+        }) {
+            Some(id) => Err(format!("{id:?} should sit, or not: {:?}", diamonds[id])),
+            None => Ok(()),
+        }
+    }
+}

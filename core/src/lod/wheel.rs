@@ -1,0 +1,323 @@
+//! Deadlines on odometers: for how much motion a diamond's side of a threshold is certain.
+//!
+//! In:    [`Lasts`] of a judged diamond; [`Motion`] since the last frame.
+//! Out:   the bin of a deadline; the bins that are due.
+//! Keeps: odometers and, for each bin, whether it holds anything.
+//! Not here: how long a verdict lasts (`screen_error`), the ids themselves (`bins`).
+//!
+//! A verdict holds until the eye has moved far enough, or turned, or the threshold has drifted:
+//! `path + scale·(turn + drift) < slack`. For diamonds of one *class*, scale ≤ u = 2^class, so
+//! `path/u + turn + drift` is an odometer that serves them all. Deadlines on it lie in timing
+//! wheels of 32 slots, one wheel an octave of slack over u: rounded down by at most 1/16 of the
+//! slack, never up. A frame reads a handful of odometers and empties the slots that they passed.
+
+use core::ops::Range;
+
+/// What makes a verdict last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Family {
+    /// A leaf too far to be worth a split: counts path and the leaf threshold's fall.
+    Far,
+    /// A leaf that no view sees: also counts turns and the horizon's lift.
+    Hidden,
+    /// A parent that a view needs: path, turns, lift and the parent threshold's rise.
+    Needed,
+}
+
+/// For how much motion a verdict is certain.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Lasts {
+    /// Which odometers count.
+    pub family: Family,
+    /// Not less than any distance that a turn or a drift is multiplied with, metres.
+    pub scale_m: f64,
+    /// How far the eye may move if nothing else happens, metres.
+    pub slack_m: f64,
+}
+
+/// What happened between two frames, the most of all views.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Motion {
+    /// Way of the eye, metres.
+    pub path_m: f64,
+    /// Change of the horizon's tangent length, metres.
+    pub lift_m: f64,
+    /// Change of a frustum plane's unit normal, radians or more.
+    pub turn: f64,
+    /// Change of the pixels per radian over the lesser of both.
+    pub zoom: f64,
+}
+
+impl Motion {
+    /// Whether nothing at all has happened.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The greater of each.
+    pub fn most(self, other: Self) -> Self {
+        Self {
+            path_m: self.path_m.max(other.path_m),
+            lift_m: self.lift_m.max(other.lift_m),
+            turn: self.turn.max(other.turn),
+            zoom: self.zoom.max(other.zoom),
+        }
+    }
+}
+
+const FAMILIES: usize = 3;
+const CLASSES: usize = 64;
+const OCTAVES: usize = 16;
+const SLOTS: usize = 32;
+/// Class 0 has u = 2⁻²⁴ m; the last 2³⁹ m, three times the way to the sun.
+const CLASS_BIAS: i64 = 24;
+
+/// Bins that the wheels use, from 0.
+pub const WHEEL_BINS: u32 = (FAMILIES * CLASSES * OCTAVES * SLOTS) as u32;
+
+/// Odometers and wheels.
+pub struct Wheels {
+    path_m: f64,
+    lift_m: f64,
+    turn: f64,
+    /// Fall of the leaf threshold and rise of the parent threshold, relative; zooms in both.
+    drift: [f64; 2],
+    /// Which octaves of a class have a slot in use, by family and class.
+    octaves: [u16; FAMILIES * CLASSES],
+    /// Which slots are in use, by family, class and octave.
+    slots: Vec<u32>,
+    /// The reading up to which a class is emptied, by family and class.
+    passed: [f64; FAMILIES * CLASSES],
+}
+
+impl Wheels {
+    /// Odometers at 0 and no deadlines.
+    pub fn new() -> Self {
+        Self {
+            path_m: 0.0,
+            lift_m: 0.0,
+            turn: 0.0,
+            drift: [0.0; 2],
+            octaves: [0; FAMILIES * CLASSES],
+            slots: vec![0; FAMILIES * CLASSES * OCTAVES],
+            passed: [0.0; FAMILIES * CLASSES],
+        }
+    }
+
+    /// Counts a motion. Every sum is rounded up by more than its rounding error.
+    pub fn advance(&mut self, motion: &Motion) {
+        const UP: f64 = 1.0 + 1e-12;
+        self.path_m += motion.path_m * UP;
+        self.lift_m += motion.lift_m * UP;
+        self.turn += motion.turn * UP;
+        self.drift[0] += motion.zoom * UP;
+        self.drift[1] += motion.zoom * UP;
+    }
+
+    /// Counts a fall of the threshold of leaves.
+    pub fn leaf_threshold_fell(&mut self, from_px: f64, to_px: f64) {
+        self.drift[0] += (from_px - to_px) / to_px * (1.0 + 1e-12);
+    }
+
+    /// Counts a rise of the threshold of parents.
+    pub fn parent_threshold_rose(&mut self, from_px: f64, to_px: f64) {
+        self.drift[1] += (to_px - from_px) / from_px * (1.0 + 1e-12);
+    }
+
+    fn reading(&self, family: usize, class: usize) -> f64 {
+        let seen = [0.0, self.lift_m, self.lift_m][family];
+        let turn = [0.0, self.turn, self.turn][family];
+        let drift = self.drift[family / 2];
+        (self.path_m + seen) * unit_inverse(class) + turn + drift
+    }
+
+    /// The bin of a deadline that starts now; `None` where the next motion may already be too
+    /// much. The bin counts as in use from here on.
+    pub fn book(&mut self, lasts: &Lasts) -> Option<u32> {
+        let family = lasts.family as usize;
+        let class = class_of(lasts.scale_m)?;
+        let reading = self.reading(family, class);
+        let share = lasts.slack_m * unit_inverse(class);
+        let share = if share > 1.0 { 1.0 } else { share };
+        // Less by what rounding may add, here and in the readings to come.
+        let share = share * (1.0 - 1e-6) - reading * 1e-13;
+        let octave = octave_of(share)?;
+        let at = family * CLASSES + class;
+        let slot = tick(reading + share, octave) as usize % SLOTS;
+        self.octaves[at] |= 1 << octave;
+        self.slots[at * OCTAVES + octave] |= 1 << slot;
+        let bin = (at * OCTAVES + octave) * SLOTS + slot;
+        Some(u32::try_from(bin).expect("bins are counted in u32"))
+    }
+
+    /// Notes that a bin has become empty.
+    pub fn emptied(&mut self, bin: u32) {
+        let wheel = bin as usize / SLOTS;
+        self.slots[wheel] &= !(1 << (bin as usize % SLOTS));
+        if self.slots[wheel] == 0 {
+            self.octaves[wheel / OCTAVES] &= !(1 << (wheel % OCTAVES));
+        }
+    }
+
+    /// Calls `empty` with every bin in use that the odometers have passed; they count as empty.
+    pub fn pass(&mut self, mut empty: impl FnMut(u32)) {
+        for at in 0..FAMILIES * CLASSES {
+            let reading = self.reading(at / CLASSES, at % CLASSES);
+            let from = core::mem::replace(&mut self.passed[at], reading);
+            let mut octaves = self.octaves[at];
+            while octaves != 0 {
+                let octave = octaves.trailing_zeros() as usize;
+                octaves &= octaves - 1;
+                let wheel = at * OCTAVES + octave;
+                let due = self.slots[wheel] & passed_slots(tick(from, octave), tick(reading, octave));
+                self.empty_slots(wheel, due, &mut empty);
+            }
+        }
+    }
+
+    /// Calls `empty` with every bin in use; they count as empty.
+    pub fn pass_all(&mut self, mut empty: impl FnMut(u32)) {
+        for wheel in 0..self.slots.len() {
+            self.empty_slots(wheel, self.slots[wheel], &mut empty);
+        }
+        for at in 0..FAMILIES * CLASSES {
+            self.passed[at] = self.reading(at / CLASSES, at % CLASSES);
+        }
+    }
+
+    fn empty_slots(&mut self, wheel: usize, mut due: u32, empty: &mut impl FnMut(u32)) {
+        while due != 0 {
+            let bin = wheel * SLOTS + due.trailing_zeros() as usize;
+            due &= due - 1;
+            let bin = u32::try_from(bin).expect("bins are counted in u32");
+            empty(bin);
+            self.emptied(bin);
+        }
+    }
+
+    /// The bins of the wheels in use, for checks.
+    pub fn in_use(&self) -> impl Iterator<Item = u32> + use<'_> {
+        let bins: Range<u32> = 0..WHEEL_BINS;
+        bins.filter(|&bin| self.slots[bin as usize / SLOTS] >> (bin as usize % SLOTS) & 1 == 1)
+    }
+}
+
+impl Default for Wheels {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// 2^−class, exact.
+fn unit_inverse(class: usize) -> f64 {
+    f64::from_bits((1023 + CLASS_BIAS.unsigned_abs() - class as u64) << 52)
+}
+
+/// The class whose u is at least `scale_m`; `None` if there is none so large.
+fn class_of(scale_m: f64) -> Option<usize> {
+    let exponent = (scale_m.to_bits() >> 52).cast_signed() - 1023;
+    let class = exponent + 1 + CLASS_BIAS;
+    let fits = scale_m >= 0.0 && class < CLASSES as i64;
+    fits.then(|| usize::try_from(class.max(0)).expect("clamped"))
+}
+
+/// The octave below which a share of u lies: 0 for [1/2, 1), …; `None` if it is too small.
+fn octave_of(share: f64) -> Option<usize> {
+    let below_one = 1022_i64 - (share.to_bits() >> 52).cast_signed();
+    let fits = share > 0.0 && below_one < OCTAVES as i64;
+    fits.then(|| usize::try_from(below_one.max(0)).expect("clamped"))
+}
+
+/// The tick of an octave's wheel in which a reading falls: 1/16 to 1/32 of a share of the octave.
+fn tick(reading: f64, octave: usize) -> u64 {
+    let per_unit = f64::from_bits((1023 + 5 + octave as u64) << 52);
+    // Saturates; readings so large are beyond what shares can be told from.
+    (reading * per_unit) as u64
+}
+
+/// The slots of the ticks after `from` up to and with `to`.
+fn passed_slots(from: u64, to: u64) -> u32 {
+    let count = to.saturating_sub(from);
+    if count >= SLOTS as u64 {
+        return u32::MAX;
+    }
+    let run = u32::try_from((1_u64 << count) - 1).expect("fewer than 32 bits");
+    run.rotate_left(u32::try_from((from + 1) % SLOTS as u64).expect("below 32"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::digest::mix;
+
+    fn unit(seed: u64) -> f64 {
+        (mix(seed) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Random verdicts under random motion: none may be passed late, and none much too early.
+    #[test]
+    fn no_deadline_is_passed_late_and_none_a_fifth_too_early() {
+        let mut wheels = Wheels::new();
+        let mut pending: Vec<(u32, Lasts, f64, f64)> = Vec::new();
+        let (mut path_m, mut drift, mut seed, mut early, mut done) = (0.0, 0.0, 0, 0, 0);
+        for frame in 0..4_000_u64 {
+            let motion = Motion { path_m: 3.0 * unit(frame), ..Motion::default() };
+            let fall = if frame % 50 == 7 { 1e-3 } else { 0.0 };
+            wheels.advance(&motion);
+            wheels.leaf_threshold_fell(1.0 + fall, 1.0);
+            (path_m, drift) = (path_m + motion.path_m, drift + fall);
+            let mut due = Vec::new();
+            wheels.pass(|bin| due.push(bin));
+            pending.retain(|&(bin, lasts, at_m, drifted)| {
+                let used_m = path_m - at_m + lasts.scale_m * (drift - drifted);
+                let is_due = due.contains(&bin);
+                assert!(is_due || used_m < lasts.slack_m, "{lasts:?} is late: {used_m}");
+                // Classes round the scale up by at most 2, so only the path is held exactly.
+                let slow = drift == drifted && used_m + 3.0 < 0.8 * lasts.slack_m.min(lasts.scale_m);
+                early += u32::from(is_due && slow);
+                done += u32::from(is_due);
+                !is_due
+            });
+            for _ in 0..5 {
+                seed += 3;
+                let scale_m = 1e4 * unit(seed) + 1e-3;
+                let slack_m = scale_m * unit(seed + 1) * unit(seed + 2);
+                let lasts = Lasts { family: Family::Far, scale_m, slack_m };
+                if let Some(bin) = wheels.book(&lasts) {
+                    pending.push((bin, lasts, path_m, drift));
+                }
+            }
+        }
+        assert_eq!(early, 0);
+        assert!(done > 10_000, "{done}");
+    }
+
+    #[test]
+    fn what_is_too_large_or_too_small_for_a_wheel_gets_no_bin() {
+        let mut wheels = Wheels::new();
+        let mut book = |scale_m, slack_m| {
+            wheels.book(&Lasts { family: Family::Hidden, scale_m, slack_m }).is_some()
+        };
+        assert!(book(100.0, 10.0) && book(100.0, 1e300) && book(0.0, 1.0) && book(5e11, 1e11));
+        for (scale_m, slack_m) in [(100.0, 0.0), (100.0, -1.0), (100.0, 1e-4), (1e18, 1e17)] {
+            assert!(!book(scale_m, slack_m), "{scale_m} {slack_m}");
+        }
+        for odd in [f64::NAN, f64::INFINITY, -1.0] {
+            assert!(!book(odd, 1.0), "scale {odd}");
+        }
+        assert!(!book(1.0, f64::NAN));
+    }
+
+    #[test]
+    fn a_pass_over_all_empties_all() {
+        let mut wheels = Wheels::new();
+        for step in 1..100 {
+            let slack_m = f64::from(step);
+            wheels.book(&Lasts { family: Family::Needed, scale_m: 1000.0, slack_m }).unwrap();
+        }
+        let before = wheels.in_use().count();
+        let mut passed = 0;
+        wheels.pass_all(|_| passed += 1);
+        assert!(passed == before && before > 20 && wheels.in_use().count() == 0);
+    }
+}
