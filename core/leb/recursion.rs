@@ -177,25 +177,29 @@ fn refine_root(
         deepest = deepest.max(depth);
         let splits_first = rule.wants(first.middle, edge_squared);
         let splits_second = rule.wants(second.middle, edge_squared);
-        if !splits_first {
-            leaf(&first, depth);
-        }
-        if !splits_second {
-            leaf(&second, depth);
-        }
-        if splits_first {
-            if splits_second {
+        match (splits_first, splits_second) {
+            (true, true) => {
                 waiting[top] = (second, edge_squared, depth);
                 top += 1;
+                triangle = first;
             }
-            triangle = first;
-        } else if splits_second {
-            triangle = second;
-        } else if top > 0 {
-            top -= 1;
-            (triangle, edge_squared, depth) = waiting[top];
-        } else {
-            break;
+            (true, false) => {
+                leaf(&second, depth);
+                triangle = first;
+            }
+            (false, true) => {
+                leaf(&first, depth);
+                triangle = second;
+            }
+            (false, false) => {
+                leaf(&first, depth);
+                leaf(&second, depth);
+                if top == 0 {
+                    break;
+                }
+                top -= 1;
+                (triangle, edge_squared, depth) = waiting[top];
+            }
         }
     }
     tally.leaves += leaves;

@@ -162,6 +162,8 @@ impl Terrain {
     /// What does not agree, in words.
     pub fn audit(&self) -> Result<(), String> {
         let (lod, pages, patches) = (self.lod.read(), self.pages.read(), self.patches.read());
+        let judge = |diamonds: &_, id, band| judge(&lod.cover, &lod.before, (diamonds, id), band);
+        lod.mesh.check(&judge)?;
         audit::consistent(&lod.mesh, &lod.cover, &pages, &patches)?;
         audit::closed(&lod.mesh.diamonds, &lod.cover, &patches)
     }

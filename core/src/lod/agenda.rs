@@ -220,6 +220,11 @@ impl Agenda {
         Rank { priority_px, level: record.level(), key: record.key() }
     }
 
+    /// All diamonds whose verdict is taken to last, for checks.
+    pub fn certain(&self) -> impl Iterator<Item = DiamondId> + use<'_> {
+        self.wheels.in_use().flat_map(|bin| self.bins.content(bin))
+    }
+
     /// Bytes in use besides the records: priorities, bins, lists.
     pub fn bytes(&self, diamonds: u32) -> usize {
         let per_diamond = size_of::<f64>() + 3 * size_of::<DiamondId>();

@@ -31,7 +31,6 @@ pub fn consistent(
     patches: &Patches,
 ) -> Result<(), String> {
     let diamonds = &mesh.diamonds;
-    mesh.agenda.check(diamonds)?;
     let free = diamonds.free().count();
     let (live, end) = (diamonds.live() as usize, diamonds.used_end() as usize);
     ensure(free + live == end && diamonds.ids().count() == live, || {

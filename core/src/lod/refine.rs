@@ -182,6 +182,26 @@ impl Mesh {
         self.seat(id, verdict);
     }
 
+    /// Whether every verdict that is taken to last is still what would be said now; for checks.
+    ///
+    /// # Errors
+    /// The first that is not, in words.
+    pub fn check(
+        &self,
+        judge: &impl Fn(&Diamonds, DiamondId, Band) -> Verdict,
+    ) -> Result<(), String> {
+        self.agenda.check(&self.diamonds)?;
+        let band = self.agenda.band();
+        let mut certain = self.agenda.certain();
+        let wrong = certain.find_map(|id| match judge(&self.diamonds, id, band) {
+            Verdict::Urgent(priority_px) => Some((id, priority_px)),
+            Verdict::Certain(_) => None,
+        });
+        wrong.map_or(Ok(()), |(id, px)| {
+            Err(format!("{id:?} has {px} px and passes for certain: {band:?} {:?}", self.diamonds[id]))
+        })
+    }
+
     /// Second half of a frame. Merges come first and have a count of their own, so that splits
     /// cannot starve them, at any speed.
     pub fn refine(&mut self, rule: &mut impl Rule) -> Refinement {
@@ -266,35 +286,17 @@ impl Mesh {
         self.agenda.wait(&mut self.diamonds, id);
     }
 
-    /// No known leaf is as urgent as the threshold says. Lowers it where certain leaves below it
-    /// could be split. False if they could not.
+    /// No known leaf is as urgent as the threshold says, `known_px` at most: certain ones below it
+    /// may come first. Lowers the threshold; false if it is at the tolerance.
     fn look_deeper(&mut self, rule: &impl Rule, known_px: f64) -> bool {
-        let judge = |diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band);
-        let Band { leaf_px, parent_px } = self.agenda.band();
+        let Band { leaf_px, .. } = self.agenda.band();
         let floor_px = self.knobs.tolerance_px.next_up();
         if leaf_px <= floor_px {
             return false;
         }
-        let mut to_px = leaf_px * (1.0 - 2.0 * MARGIN);
-        if self.diamonds.leaves() + 2 > self.knobs.leaves_max {
-            if self.done.merges >= self.knobs.merges_max {
-                return false;
-            }
-            let least_px = self.least_parent_px();
-            if least_px > parent_px && parent_px < leaf_px {
-                // A certain parent might be worth less than a certain leaf.
-                self.agenda.raise_parent_threshold(leaf_px);
-                self.judge_due(&judge, ALONE);
-                return true;
-            }
-            if least_px >= leaf_px {
-                return false;
-            }
-            to_px = to_px.min(least_px * (1.0 - MARGIN));
-        }
-        to_px = if known_px > 0.0 { to_px.max(known_px.min(leaf_px)) } else { to_px };
-        self.agenda.lower_leaf_threshold(to_px.max(floor_px));
-        self.judge_due(&judge, ALONE);
+        let to_px = known_px.max(leaf_px * (1.0 - 2.0 * MARGIN)).max(floor_px);
+        self.agenda.lower_leaf_threshold(to_px);
+        self.judge_due(&|diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band), ALONE);
         true
     }
 
