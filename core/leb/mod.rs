@@ -8,6 +8,7 @@
 #![allow(dead_code, reason = "the bench, the example and each test use a part of the folder")]
 
 pub mod answers;
+pub mod engine;
 pub mod recursion;
 pub mod stats;
 pub mod workload;

@@ -20,7 +20,7 @@ use crate::lod::screen_error::{Horizon, Sight, motion_between};
 use crate::lod::{audit, want};
 use crate::mesh::build::{BLOCK, Block as BuildBlock, Ground, build_block, store};
 use crate::mesh::patches::Patches;
-use crate::mesh::place::{self, Block as PlaceBlock, empty_draws, join, place_block};
+use crate::mesh::place::{self, BLOCK_GRAIN, LIST_GRAIN, Placed, empty_draws, place_blocks};
 use crate::settings::SceneSettings;
 use overfly_jobs::{Graph, Span, StageId, Team};
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
@@ -66,7 +66,7 @@ pub struct Terrain {
     lod: RwLock<Lod>,
     patches: RwLock<Patches>,
     build_blocks: Mutex<Vec<BuildBlock>>,
-    place_blocks: Mutex<Vec<PlaceBlock>>,
+    placed: Mutex<Vec<Placed>>,
     output: Mutex<FrameOutput>,
 }
 
@@ -75,7 +75,6 @@ impl Terrain {
     pub fn new(settings: &SceneSettings, generator: &Generator) -> Self {
         let limits = Limits::of(settings);
         let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
-        let ranges = settings.depth.splits_m.len() + 1;
         Self {
             horizon: Horizon::new(
                 &settings.body,
@@ -95,7 +94,7 @@ impl Terrain {
                 limits.built,
                 patches.vertices_per_patch,
             )),
-            place_blocks: Mutex::new(PlaceBlock::for_patches(limits.leaves, ranges)),
+            placed: Mutex::default(),
             patches: RwLock::new(patches),
             output: Mutex::default(),
             settings: settings.clone(),
@@ -232,8 +231,8 @@ fn prioritise(terrain: &Terrain, team: &Team<'_>) {
     before.extend_from_slice(&eyes.sights);
     let cover = &*cover;
     let judge = |diamonds: &_, id, band| judge(cover, &eyes.sights, (diamonds, id), band);
-    let evaluations = mesh.prioritise(&judge, motion, &|verdicts, body| {
-        team.for_each_chunk(verdicts, GRAIN, body);
+    let evaluations = mesh.prioritise(&judge, motion, &|placements, body| {
+        team.for_each_chunk(placements, GRAIN, body);
     });
     terrain.output.lock().counts.evaluations = evaluations;
 }
@@ -312,32 +311,38 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     output.digest.vertices = patches.digest();
 }
 
-/// Draws of every view, in parallel over chunks of slots.
+/// Draws of every view, in parallel over blocks of slots, then over parts of the lists.
 fn place(terrain: &Terrain, team: &Team<'_>) {
     let eyes = terrain.eyes.read();
     let patches = terrain.patches.read();
-    let mut blocks = terrain.place_blocks.lock();
+    let mut placed = terrain.placed.lock();
     let mut output = terrain.output.lock();
-    let depth = &terrain.settings.depth;
+    let (depth, leaves) = (&terrain.settings.depth, terrain.limits.leaves);
     if output.views.len() != eyes.cameras.len() {
-        let draws = |camera: &Camera| empty_draws(*camera, depth, terrain.limits.leaves);
+        let draws = |camera: &Camera| empty_draws(*camera, depth, leaves);
         output.views = eyes.cameras.iter().map(draws).collect();
     }
-    let used = &mut blocks[..(patches.used_end() as usize).div_ceil(place::CHUNK)];
+    placed.resize_with(eyes.cameras.len(), || Placed::new(leaves));
     let mut digest = Chain::default();
     let mut drawn = 0;
-    for (view, camera) in output.views.iter_mut().zip(&eyes.cameras) {
+    for ((view, placed), camera) in output.views.iter_mut().zip(&mut *placed).zip(&eyes.cameras) {
         view.camera = *camera;
         for (range, (near_m, far_m)) in
             view.ranges.iter_mut().zip(place::ranges_of(camera.near_m, depth))
         {
             (range.near_m, range.far_m) = (near_m, far_m);
         }
-        team.for_each_chunk(used, 1, |first, chunk| {
-            place_block(&patches, view, first, &mut chunk[0]);
+        let (aim, blocks) = placed.begin(view, &patches);
+        team.for_each_chunk(blocks, BLOCK_GRAIN, |first, blocks| {
+            place_blocks(&patches, &aim, first, blocks);
         });
-        digest.add(join(used, view));
-        drawn += view.ranges.iter().map(|range| range.patches.len()).sum::<usize>();
+        digest.add(placed.count(view));
+        for (index, range) in view.ranges.iter_mut().enumerate() {
+            drawn += range.patches.len();
+            team.for_each_chunk(&mut range.patches, LIST_GRAIN, |first, out| {
+                placed.list(index, first, out);
+            });
+        }
     }
     output.counts.drawn = u32::try_from(drawn).expect("patches times ranges fits");
     output.digest.draws = digest.0;

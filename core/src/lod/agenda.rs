@@ -36,6 +36,15 @@ pub enum Verdict {
     Certain(Lasts),
 }
 
+/// Where a verdict puts a diamond.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Placement {
+    /// Among the urgent, with this priority in pixels.
+    Urgent(f64),
+    /// Into this bin.
+    Bin(u32),
+}
+
 const URGENT_LEAVES: u32 = WHEEL_BINS;
 const URGENT_PARENTS: u32 = URGENT_LEAVES + URGENT_BINS;
 /// Due with the next motion, however small.
@@ -84,6 +93,39 @@ impl Agenda {
         self.band
     }
 
+    /// Where every urgent diamond will be split or merged at once: loads what that touches into
+    /// the cache, so that the operations do not wait for memory one after the other.
+    pub fn warm_urgent(&mut self, diamonds: &Diamonds) {
+        let mut list = core::mem::take(&mut self.due);
+        self.leaves.list(&self.bins, &mut list);
+        let leaves = list.len();
+        self.parents.list(&self.bins, &mut list);
+        let count = list.len();
+        diamonds.warm(&list);
+        for at in 0..count {
+            let record = &diamonds[list[at]];
+            if at < leaves {
+                list.extend(record.parents().into_iter().flatten());
+            } else {
+                list.extend(record.kids().into_iter().flatten());
+            }
+        }
+        diamonds.warm(&list[count..]);
+        let around = list.len();
+        for at in count..around {
+            let id = list[at];
+            list.extend(diamonds[id].kids().into_iter().flatten());
+            list.extend(diamonds[id].parents().into_iter().flatten());
+        }
+        diamonds.warm(&list[around..]);
+        list.truncate(around);
+        list.drain(..count);
+        list.retain(|&id| diamonds[id].seat == Seat::Bin);
+        self.bins.warm(diamonds, &mut list);
+        list.clear();
+        self.due = list;
+    }
+
     /// Starts a frame: what the motion may have changed becomes due; without motion, waiting
     /// leaves are urgent again as they were. `None` is a motion that may have changed anything.
     pub fn start(&mut self, diamonds: &mut Diamonds, motion: Option<Motion>) {
@@ -92,7 +134,7 @@ impl Agenda {
         if motion.is_some_and(|motion| motion.is_none()) {
             self.bins.drain(WAITING, &mut self.due);
             while let Some(id) = self.due.pop() {
-                self.seat(diamonds, id, Verdict::Urgent(self.priority_px[id]));
+                self.seat(diamonds, id, Placement::Urgent(self.priority_px[id]));
             }
             return;
         }
@@ -148,14 +190,25 @@ impl Agenda {
         self.due = due;
     }
 
-    /// Seats a leaf or a parent that is nowhere, or was just drained from where it was.
-    pub fn seat(&mut self, diamonds: &mut Diamonds, id: DiamondId, verdict: Verdict) {
+    /// Where a verdict that is given now puts a diamond.
+    #[inline]
+    pub fn placement(&self, verdict: &Verdict) -> Placement {
         match verdict {
-            Verdict::Certain(lasts) => {
-                let bin = self.wheels.book(&lasts).unwrap_or(SOON);
-                self.bins.push(diamonds, bin, id);
+            Verdict::Urgent(priority_px) => Placement::Urgent(*priority_px),
+            Verdict::Certain(lasts) => Placement::Bin(self.wheels.bin_of(lasts).unwrap_or(SOON)),
+        }
+    }
+
+    /// Seats a leaf or a parent that is nowhere, or was just drained from where it was.
+    #[inline]
+    pub fn seat(&mut self, diamonds: &mut Diamonds, id: DiamondId, placement: Placement) {
+        match placement {
+            Placement::Bin(bin) => {
+                if self.bins.push(diamonds, bin, id) && bin < WHEEL_BINS {
+                    self.wheels.filled(bin);
+                }
             }
-            Verdict::Urgent(priority_px) => {
+            Placement::Urgent(priority_px) => {
                 self.priority_px[id] = priority_px;
                 let is_leaf = diamonds[id].role() == Role::Leaf;
                 let set = if is_leaf { &mut self.leaves } else { &mut self.parents };
@@ -221,8 +274,10 @@ impl Agenda {
     }
 
     /// All diamonds whose verdict is taken to last, for checks.
-    pub fn certain(&self) -> impl Iterator<Item = DiamondId> + use<'_> {
-        self.wheels.in_use().flat_map(|bin| self.bins.content(bin))
+    pub fn certain(&self) -> Vec<DiamondId> {
+        let mut all = Vec::new();
+        self.wheels.in_use().for_each(|bin| self.bins.list(bin, &mut all));
+        all
     }
 
     /// Bytes in use besides the records: priorities, bins, lists.
@@ -237,10 +292,10 @@ impl Agenda {
     /// The first disagreement in words.
     pub fn check(&self, diamonds: &Diamonds) -> Result<(), String> {
         let mut seated = vec![false; diamonds.used_end() as usize];
-        let wheels = self.wheels.in_use().flat_map(|bin| self.bins.content(bin));
-        let rest = [SOON, WAITING].into_iter().flat_map(|bin| self.bins.content(bin));
-        let urgent = [&self.leaves, &self.parents].map(|set| set.content(&self.bins));
-        for id in wheels.chain(rest).chain(urgent.into_iter().flatten()) {
+        let mut all = self.certain();
+        [SOON, WAITING].into_iter().for_each(|bin| self.bins.list(bin, &mut all));
+        [&self.leaves, &self.parents].into_iter().for_each(|set| set.list(&self.bins, &mut all));
+        for id in all {
             let record = &diamonds[id];
             let there = match record.seat {
                 Seat::Bin => self.bins.holds(record.place, id),

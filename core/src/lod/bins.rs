@@ -18,7 +18,8 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Chunk {
-    ids: [Option<DiamondId>; CHUNK as usize],
+    /// Those beyond the bin's end are stale.
+    ids: [DiamondId; CHUNK as usize],
     /// The chunk before in the same bin, full; in the free list, the next free one.
     previous: u32,
     bin: u32,
@@ -62,18 +63,24 @@ impl Bins {
         self.tails[bin as usize].chunk == NONE
     }
 
-    /// Puts a diamond into a bin and writes its seat.
-    pub fn push(&mut self, diamonds: &mut Diamonds, bin: u32, id: DiamondId) {
-        let Tail { mut chunk, mut len } = self.tails[bin as usize];
-        if len == CHUNK {
-            chunk = self.take_chunk(bin, chunk);
-            len = 0;
+    /// Puts a diamond into a bin and writes its seat; whether the bin was empty.
+    #[inline]
+    pub fn push(&mut self, diamonds: &mut Diamonds, bin: u32, id: DiamondId) -> bool {
+        let tail = &mut self.tails[bin as usize];
+        let was_empty = tail.chunk == NONE;
+        if tail.len < CHUNK {
+            self.chunks[tail.chunk as usize].ids[tail.len as usize] = id;
+            tail.len += 1;
+        } else {
+            let previous = tail.chunk;
+            let chunk = self.take_chunk((bin, previous), id);
+            self.tails[bin as usize] = Tail { chunk, len: 1 };
         }
-        self.chunks[chunk as usize].ids[len as usize] = Some(id);
-        self.tails[bin as usize] = Tail { chunk, len: len + 1 };
+        let Tail { chunk, len } = self.tails[bin as usize];
         let record = &mut diamonds[id];
         debug_assert!(record.seat == Seat::None || record.seat == Seat::Bin, "drained or new");
-        (record.seat, record.place) = (Seat::Bin, chunk * 16 + len);
+        (record.seat, record.place) = (Seat::Bin, chunk * 16 + len - 1);
+        was_empty
     }
 
     /// Takes a diamond out of its bin; returns the bin. The bin's last fills the gap.
@@ -85,9 +92,9 @@ impl Bins {
         let (chunk, at) = (place / 16, place % 16);
         let bin = self.chunks[chunk as usize].bin;
         let Tail { chunk: tail, len } = self.tails[bin as usize];
-        let last = self.chunks[tail as usize].ids[len as usize - 1].expect("a tail holds ids");
+        let last = self.chunks[tail as usize].ids[len as usize - 1];
         if last != id {
-            self.chunks[chunk as usize].ids[at as usize] = Some(last);
+            self.chunks[chunk as usize].ids[at as usize] = last;
             diamonds[last].place = place;
         }
         self.tails[bin as usize] = if len > 1 {
@@ -105,16 +112,30 @@ impl Bins {
     pub fn drain(&mut self, bin: u32, out: &mut Vec<DiamondId>) {
         let Tail { mut chunk, mut len } = self.tails[bin as usize];
         while chunk != NONE {
-            let Chunk { ids, previous, .. } = self.chunks[chunk as usize];
-            out.extend(ids[..len as usize].iter().map(|id| id.expect("a full part of a chunk")));
+            let Chunk { ids, previous, .. } = &self.chunks[chunk as usize];
+            out.extend_from_slice(&ids[..len as usize]);
+            let previous = *previous;
             self.give_chunk_back(chunk);
             (chunk, len) = (previous, CHUNK);
         }
         self.tails[bin as usize] = Tail { chunk: NONE, len: CHUNK };
     }
 
-    fn take_chunk(&mut self, bin: u32, previous: u32) -> u32 {
-        let fresh = Chunk { ids: [None; CHUNK as usize], previous, bin };
+    /// Loads what removing these diamonds would touch into the cache, all at once.
+    pub fn warm(&self, diamonds: &Diamonds, ids: &mut [DiamondId]) {
+        let chunk_of = |id: DiamondId| &self.chunks[(diamonds[id].place / 16) as usize];
+        core::hint::black_box(ids.iter().fold(0, |sum, &id| sum ^ chunk_of(id).bin));
+        let tail_of = |id: DiamondId| self.tails[chunk_of(id).bin as usize];
+        core::hint::black_box(ids.iter().fold(0, |sum, &id| sum ^ tail_of(id).len));
+        for id in &mut *ids {
+            let Tail { chunk, len } = tail_of(*id);
+            *id = self.chunks[chunk as usize].ids[len as usize - 1];
+        }
+        diamonds.warm(ids);
+    }
+
+    fn take_chunk(&mut self, (bin, previous): (u32, u32), first: DiamondId) -> u32 {
+        let fresh = Chunk { ids: [first; CHUNK as usize], previous, bin };
         if self.free == NONE {
             self.chunks.push(fresh);
             return u32::try_from(self.chunks.len() - 1).expect("chunks are counted in u32");
@@ -130,16 +151,14 @@ impl Bins {
         self.free = chunk;
     }
 
-    /// The ids of one bin, for checks.
-    pub fn content(&self, bin: u32) -> Vec<DiamondId> {
+    /// Adds the ids of one bin to a list; they stay.
+    pub fn list(&self, bin: u32, out: &mut Vec<DiamondId>) {
         let Tail { mut chunk, mut len } = self.tails[bin as usize];
-        let mut all = Vec::new();
         while chunk != NONE {
-            let Chunk { ids, previous, .. } = self.chunks[chunk as usize];
-            all.extend(ids[..len as usize].iter().flatten());
-            (chunk, len) = (previous, CHUNK);
+            let Chunk { ids, previous, .. } = &self.chunks[chunk as usize];
+            out.extend_from_slice(&ids[..len as usize]);
+            (chunk, len) = (*previous, CHUNK);
         }
-        all
     }
 
     /// The bin in which a place is.
@@ -150,7 +169,7 @@ impl Bins {
     /// Whether `place` holds `id`, for checks.
     pub fn holds(&self, place: u32, id: DiamondId) -> bool {
         let chunk = self.chunks.get((place / 16) as usize);
-        chunk.is_some_and(|chunk| chunk.ids.get((place % 16) as usize) == Some(&Some(id)))
+        chunk.is_some_and(|chunk| chunk.ids.get((place % 16) as usize) == Some(&id))
     }
 }
 

@@ -12,14 +12,16 @@
 //! the parent threshold; before a choice could depend on them, the threshold is moved and those
 //! that may have been passed are judged.
 
-use super::agenda::{Agenda, Band, Verdict};
+use super::agenda::{Agenda, Band, Placement, Verdict};
 use super::diamonds::{DiamondId, Diamonds, Role, Seat};
 use super::wheel::Motion;
 use crate::datasource::PageKey;
 use core::cmp::Ordering;
 
-/// Verdicts computed together.
-const BLOCK: usize = 8192;
+/// Verdicts computed together where there are many, so that workers can share them.
+const BLOCK: usize = 4096;
+/// Where there are few: their records stay in the first cache until they are seated.
+const SMALL_BLOCK: usize = 256;
 
 /// Share of a threshold by which the thresholds enclose the priority where both sides meet: more
 /// of it means more urgent diamonds, less of it more moves of the thresholds.
@@ -87,16 +89,16 @@ pub struct Mesh {
     chain: Vec<DiamondId>,
     /// Split or merged in this frame: judged at its end, since they cannot change again in it.
     late: Vec<DiamondId>,
-    verdicts: Vec<Verdict>,
+    placements: Vec<Placement>,
     /// Worst urgent leaf that is too deep to be split.
     deepest_px: f64,
     /// Worst leaf that waits.
     waiting_px: f64,
 }
 
-/// Spreads a pass over a column of verdicts: `spread(column, body)` calls `body` with the index of
+/// Spreads a pass over a column of placements: `spread(column, body)` calls `body` with the index of
 /// each chunk's first element and the chunk.
-pub type Spread<'a> = &'a dyn Fn(&mut [Verdict], &(dyn Fn(usize, &mut [Verdict]) + Sync));
+pub type Spread<'a> = &'a dyn Fn(&mut [Placement], &(dyn Fn(usize, &mut [Placement]) + Sync));
 
 impl Mesh {
     /// An empty mesh; every list is allocated here.
@@ -111,7 +113,7 @@ impl Mesh {
             frame: 0,
             chain: Vec::with_capacity(128),
             late: Vec::with_capacity(operations),
-            verdicts: vec![Verdict::Urgent(0.0); BLOCK.min(capacity as usize)],
+            placements: vec![Placement::Urgent(0.0); BLOCK.min(capacity as usize)],
             deepest_px: 0.0,
             waiting_px: 0.0,
         }
@@ -147,25 +149,28 @@ impl Mesh {
         spread: Spread<'_>,
     ) {
         let due = self.agenda.take_due();
-        let mut verdicts = core::mem::take(&mut self.verdicts);
+        let mut placements = core::mem::take(&mut self.placements);
         let band = self.agenda.band();
-        for ids in due.chunks(BLOCK) {
-            let verdicts = &mut verdicts[..ids.len()];
-            let diamonds = &self.diamonds;
-            spread(verdicts, &|first, chunk| {
-                for (verdict, &id) in chunk.iter_mut().zip(&ids[first..]) {
-                    *verdict = judge(diamonds, id, band);
+        let block = if due.len() > 2 * BLOCK { BLOCK } else { SMALL_BLOCK };
+        for ids in due.chunks(block) {
+            let placements = &mut placements[..ids.len()];
+            let (diamonds, agenda) = (&self.diamonds, &self.agenda);
+            spread(placements, &|first, chunk| {
+                diamonds.warm(&ids[first..first + chunk.len()]);
+                for (placement, &id) in chunk.iter_mut().zip(&ids[first..]) {
+                    *placement = agenda.placement(&judge(diamonds, id, band));
                 }
             });
-            ids.iter().zip(verdicts).for_each(|(&id, &mut verdict)| self.seat(id, verdict));
+            ids.iter().zip(placements).for_each(|(&id, &mut placement)| self.seat(id, placement));
         }
         self.done.evaluations += u32::try_from(due.len()).expect("diamonds are counted in u32");
-        self.verdicts = verdicts;
+        self.placements = placements;
         self.agenda.judged(due);
     }
 
-    fn seat(&mut self, id: DiamondId, verdict: Verdict) {
-        if let Verdict::Urgent(priority_px) = verdict {
+    #[inline]
+    fn seat(&mut self, id: DiamondId, placement: Placement) {
+        if let Placement::Urgent(priority_px) = placement {
             let record = &self.diamonds[id];
             if record.level() >= self.knobs.level_max && !record.is_split() {
                 self.deepest_px = self.deepest_px.max(priority_px);
@@ -173,13 +178,13 @@ impl Mesh {
                 return;
             }
         }
-        self.agenda.seat(&mut self.diamonds, id, verdict);
+        self.agenda.seat(&mut self.diamonds, id, placement);
     }
 
     fn judge(&mut self, rule: &impl Rule, id: DiamondId) {
         let verdict = rule.judge(&self.diamonds, id, self.agenda.band());
         self.done.evaluations += 1;
-        self.seat(id, verdict);
+        self.seat(id, self.agenda.placement(&verdict));
     }
 
     /// Whether every verdict that is taken to last is still what would be said now; for checks.
@@ -192,7 +197,7 @@ impl Mesh {
     ) -> Result<(), String> {
         self.agenda.check(&self.diamonds)?;
         let band = self.agenda.band();
-        let mut certain = self.agenda.certain();
+        let mut certain = self.agenda.certain().into_iter();
         let wrong = certain.find_map(|id| match judge(&self.diamonds, id, band) {
             Verdict::Urgent(priority_px) => Some((id, priority_px)),
             Verdict::Certain(_) => None,
@@ -208,6 +213,9 @@ impl Mesh {
         self.lacking.clear();
         self.waiting_px = 0.0;
         self.judge_late(rule);
+        if self.agenda.band().parent_px <= self.knobs.tolerance_px {
+            self.agenda.warm_urgent(&self.diamonds);
+        }
         self.merge_needless(rule);
         while self.done.splits < self.knobs.splits_max {
             if !self.split_first(rule) {

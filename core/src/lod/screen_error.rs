@@ -279,19 +279,17 @@ pub fn priority_px(region: &Region, sights: &[Sight]) -> f64 {
 
 /// The verdict on a leaf: certain while it is below the threshold in every view.
 pub fn judge_leaf(region: &Region, sights: &[Sight], threshold_px: f64) -> Verdict {
-    let never = Lasts { family: Family::Far, scale_m: 0.0, slack_m: f64::INFINITY };
-    sights.iter().map(|sight| sight.leaf(region, threshold_px)).fold(
-        Verdict::Certain(never),
-        |all, one| match (all, one) {
-            (Verdict::Urgent(a), Verdict::Urgent(b)) => Verdict::Urgent(if a > b { a } else { b }),
-            (Verdict::Urgent(px), _) | (_, Verdict::Urgent(px)) => Verdict::Urgent(px),
-            (Verdict::Certain(a), Verdict::Certain(b)) => Verdict::Certain(Lasts {
-                family: if b.family == Family::Hidden { b.family } else { a.family },
-                scale_m: a.scale_m.max(b.scale_m),
-                slack_m: a.slack_m.min(b.slack_m),
-            }),
-        },
-    )
+    let both = |all, one| match (all, one) {
+        (Verdict::Urgent(a), Verdict::Urgent(b)) => Verdict::Urgent(if a > b { a } else { b }),
+        (Verdict::Urgent(px), _) | (_, Verdict::Urgent(px)) => Verdict::Urgent(px),
+        (Verdict::Certain(a), Verdict::Certain(b)) => Verdict::Certain(Lasts {
+            family: if b.family == Family::Hidden { b.family } else { a.family },
+            scale_m: a.scale_m.max(b.scale_m),
+            slack_m: a.slack_m.min(b.slack_m),
+        }),
+    };
+    let verdicts = sights.iter().map(|sight| sight.leaf(region, threshold_px));
+    verdicts.reduce(both).unwrap_or(Verdict::Certain(Lasts::FOREVER))
 }
 
 /// The verdict on a parent: certain while it is above the threshold in one view.

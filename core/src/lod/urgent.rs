@@ -203,11 +203,15 @@ impl Urgent {
         seating.diamonds[self.front[b]].place = index(b);
     }
 
-    /// The set's content, for checks.
-    pub fn content(&self, bins: &Bins) -> Vec<DiamondId> {
-        let steps = (0..URGENT_BINS).filter(|&s| self.occupied[s as usize / 64] >> (s % 64) & 1 == 1);
-        let binned = steps.flat_map(|step| bins.content(self.first_bin + step));
-        self.front.iter().copied().chain(binned).collect()
+    /// Adds the set's content to a list, in no order.
+    pub fn list(&self, bins: &Bins, out: &mut Vec<DiamondId>) {
+        out.extend_from_slice(&self.front);
+        for (word, mut bits) in self.occupied.iter().copied().enumerate() {
+            while bits != 0 {
+                bins.list(self.first_bin + index(word) * 64 + bits.trailing_zeros(), out);
+                bits &= bits - 1;
+            }
+        }
     }
 }
 

@@ -35,6 +35,12 @@ pub struct Lasts {
     pub slack_m: f64,
 }
 
+impl Lasts {
+    /// For as long as odometers count.
+    pub const FOREVER: Self =
+        Self { family: Family::Far, scale_m: (1_u64 << 38) as f64, slack_m: f64::INFINITY };
+}
+
 /// What happened between two frames, the most of all views.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Motion {
@@ -86,8 +92,8 @@ pub struct Wheels {
     octaves: [u16; FAMILIES * CLASSES],
     /// Which slots are in use, by family, class and octave.
     slots: Vec<u32>,
-    /// The reading up to which a class is emptied, by family and class.
-    passed: [f64; FAMILIES * CLASSES],
+    /// What the odometers say now, by family and class; all slots up to here are empty.
+    readings: [f64; FAMILIES * CLASSES],
 }
 
 impl Wheels {
@@ -100,7 +106,7 @@ impl Wheels {
             drift: [0.0; 2],
             octaves: [0; FAMILIES * CLASSES],
             slots: vec![0; FAMILIES * CLASSES * OCTAVES],
-            passed: [0.0; FAMILIES * CLASSES],
+            readings: [0.0; FAMILIES * CLASSES],
         }
     }
 
@@ -132,22 +138,27 @@ impl Wheels {
     }
 
     /// The bin of a deadline that starts now; `None` where the next motion may already be too
-    /// much. The bin counts as in use from here on.
-    pub fn book(&mut self, lasts: &Lasts) -> Option<u32> {
-        let family = lasts.family as usize;
+    /// much.
+    #[inline]
+    pub fn bin_of(&self, lasts: &Lasts) -> Option<u32> {
         let class = class_of(lasts.scale_m)?;
-        let reading = self.reading(family, class);
+        let at = lasts.family as usize * CLASSES + class;
+        let reading = self.readings[at];
         let share = lasts.slack_m * unit_inverse(class);
         let share = if share > 1.0 { 1.0 } else { share };
         // Less by what rounding may add, here and in the readings to come.
         let share = share * (1.0 - 1e-6) - reading * 1e-13;
         let octave = octave_of(share)?;
-        let at = family * CLASSES + class;
         let slot = tick(reading + share, octave) as usize % SLOTS;
-        self.octaves[at] |= 1 << octave;
-        self.slots[at * OCTAVES + octave] |= 1 << slot;
         let bin = (at * OCTAVES + octave) * SLOTS + slot;
         Some(u32::try_from(bin).expect("bins are counted in u32"))
+    }
+
+    /// Notes that a bin is no longer empty.
+    pub fn filled(&mut self, bin: u32) {
+        let wheel = bin as usize / SLOTS;
+        self.slots[wheel] |= 1 << (bin as usize % SLOTS);
+        self.octaves[wheel / OCTAVES] |= 1 << (wheel % OCTAVES);
     }
 
     /// Notes that a bin has become empty.
@@ -163,14 +174,14 @@ impl Wheels {
     pub fn pass(&mut self, mut empty: impl FnMut(u32)) {
         for at in 0..FAMILIES * CLASSES {
             let reading = self.reading(at / CLASSES, at % CLASSES);
-            let from = core::mem::replace(&mut self.passed[at], reading);
+            let from = core::mem::replace(&mut self.readings[at], reading);
             let mut octaves = self.octaves[at];
             while octaves != 0 {
                 let octave = octaves.trailing_zeros() as usize;
                 octaves &= octaves - 1;
                 let wheel = at * OCTAVES + octave;
-                let due = self.slots[wheel] & passed_slots(tick(from, octave), tick(reading, octave));
-                self.empty_slots(wheel, due, &mut empty);
+                let passed = passed_slots(tick(from, octave), tick(reading, octave));
+                self.empty_slots(wheel, self.slots[wheel] & passed, &mut empty);
             }
         }
     }
@@ -181,7 +192,7 @@ impl Wheels {
             self.empty_slots(wheel, self.slots[wheel], &mut empty);
         }
         for at in 0..FAMILIES * CLASSES {
-            self.passed[at] = self.reading(at / CLASSES, at % CLASSES);
+            self.readings[at] = self.reading(at / CLASSES, at % CLASSES);
         }
     }
 
@@ -209,11 +220,13 @@ impl Default for Wheels {
 }
 
 /// 2^−class, exact.
+#[inline]
 fn unit_inverse(class: usize) -> f64 {
     f64::from_bits((1023 + CLASS_BIAS.unsigned_abs() - class as u64) << 52)
 }
 
 /// The class whose u is at least `scale_m`; `None` if there is none so large.
+#[inline]
 fn class_of(scale_m: f64) -> Option<usize> {
     let exponent = (scale_m.to_bits() >> 52).cast_signed() - 1023;
     let class = exponent + 1 + CLASS_BIAS;
@@ -222,6 +235,7 @@ fn class_of(scale_m: f64) -> Option<usize> {
 }
 
 /// The octave below which a share of u lies: 0 for [1/2, 1), …; `None` if it is too small.
+#[inline]
 fn octave_of(share: f64) -> Option<usize> {
     let below_one = 1022_i64 - (share.to_bits() >> 52).cast_signed();
     let fits = share > 0.0 && below_one < OCTAVES as i64;
@@ -229,6 +243,7 @@ fn octave_of(share: f64) -> Option<usize> {
 }
 
 /// The tick of an octave's wheel in which a reading falls: 1/16 to 1/32 of a share of the octave.
+#[inline]
 fn tick(reading: f64, octave: usize) -> u64 {
     let per_unit = f64::from_bits((1023 + 5 + octave as u64) << 52);
     // Saturates; readings so large are beyond what shares can be told from.
@@ -236,6 +251,7 @@ fn tick(reading: f64, octave: usize) -> u64 {
 }
 
 /// The slots of the ticks after `from` up to and with `to`.
+#[inline]
 fn passed_slots(from: u64, to: u64) -> u32 {
     let count = to.saturating_sub(from);
     if count >= SLOTS as u64 {
@@ -283,7 +299,8 @@ mod tests {
                 let scale_m = 1e4 * unit(seed) + 1e-3;
                 let slack_m = scale_m * unit(seed + 1) * unit(seed + 2);
                 let lasts = Lasts { family: Family::Far, scale_m, slack_m };
-                if let Some(bin) = wheels.book(&lasts) {
+                if let Some(bin) = wheels.bin_of(&lasts) {
+                    wheels.filled(bin);
                     pending.push((bin, lasts, path_m, drift));
                 }
             }
@@ -294,9 +311,9 @@ mod tests {
 
     #[test]
     fn what_is_too_large_or_too_small_for_a_wheel_gets_no_bin() {
-        let mut wheels = Wheels::new();
-        let mut book = |scale_m, slack_m| {
-            wheels.book(&Lasts { family: Family::Hidden, scale_m, slack_m }).is_some()
+        let wheels = Wheels::new();
+        let book = |scale_m, slack_m| {
+            wheels.bin_of(&Lasts { family: Family::Hidden, scale_m, slack_m }).is_some()
         };
         assert!(book(100.0, 10.0) && book(100.0, 1e300) && book(0.0, 1.0) && book(5e11, 1e11));
         for (scale_m, slack_m) in [(100.0, 0.0), (100.0, -1.0), (100.0, 1e-4), (1e18, 1e17)] {
@@ -313,7 +330,8 @@ mod tests {
         let mut wheels = Wheels::new();
         for step in 1..100 {
             let slack_m = f64::from(step);
-            wheels.book(&Lasts { family: Family::Needed, scale_m: 1000.0, slack_m }).unwrap();
+            let lasts = Lasts { family: Family::Needed, scale_m: 1000.0, slack_m };
+            wheels.filled(wheels.bin_of(&lasts).unwrap());
         }
         let before = wheels.in_use().count();
         let mut passed = 0;

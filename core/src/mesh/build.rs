@@ -13,8 +13,8 @@ use crate::datasource::pages::Pages;
 use crate::digest::{Chain, mix};
 use crate::geodesy::{Ecef, Ellipsoid, TwoFloat};
 use crate::lattice::normal_of;
-use crate::lod::cover::Cover;
 use crate::lod::Diamonds;
+use crate::lod::cover::Cover;
 use crate::lod::diamonds::leaf_key;
 use glam::{DVec3, IVec3};
 
@@ -24,6 +24,10 @@ pub const BLOCK: usize = 16;
 /// Scratch of one chunk: the vertices and bounds of up to [`BLOCK`] patches.
 pub struct Block {
     vertices: Vec<PatchVertex>,
+    /// Their lattice points.
+    points: Vec<IVec3>,
+    /// Body-fixed positions of one patch's vertices.
+    places: Vec<DVec3>,
     built: [BuiltPatch; BLOCK],
 }
 
@@ -31,7 +35,14 @@ impl Block {
     /// As many blocks as `patches` can need.
     pub fn for_patches(patches: u32, vertices_per_patch: u32) -> Vec<Self> {
         let vertices = vec![PatchVertex::EMPTY; BLOCK * vertices_per_patch as usize];
-        let block = || Self { vertices: vertices.clone(), built: [BuiltPatch::default(); BLOCK] };
+        let points = vec![IVec3::ZERO; vertices.len()];
+        let places = vec![DVec3::ZERO; vertices_per_patch as usize];
+        let block = || Self {
+            vertices: vertices.clone(),
+            points: points.clone(),
+            places: places.clone(),
+            built: [BuiltPatch::default(); BLOCK],
+        };
         (0..(patches as usize).div_ceil(BLOCK)).map(|_| block()).collect()
     }
 }
@@ -50,18 +61,95 @@ pub struct Ground<'a> {
     pub sea: bool,
 }
 
+/// A leaf triangle to build.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    page: &'a Page,
+    corners: [IVec3; 3],
+    key: u64,
+}
+
 /// Builds the patches of one block: `slots` are at most [`BLOCK`] live slots.
+///
+/// In three passes. The first two do little but read diamonds and pages all over the memory, so
+/// that many reads are under way at once; the third finds everything at hand.
 pub fn build_block(ground: &Ground<'_>, patches: &Patches, slots: &[u32], block: &mut Block) {
     let per_patch = patches.vertices_per_patch as usize;
-    let targets = block.vertices.chunks_exact_mut(per_patch).zip(&mut block.built);
-    for (&slot, (vertices, built)) in slots.iter().zip(targets) {
-        let leaf = patches.leaf[slot as usize].expect("only live slots are built");
-        let (id, side) = (Id::new(leaf.diamond), usize::from(leaf.side));
-        let page = ground.pages.get(ground.cover.pages[id][side].expect("a leaf's side is there"));
-        let triangle = ground.diamonds.shape(id).triangle(side);
-        let key = leaf_key(ground.diamonds[id].key(), side);
-        *built = build_patch(ground, page, (triangle, key), (patches.patch_depth, vertices));
+    let mut tasks = [None; BLOCK];
+    for (&slot, task) in slots.iter().zip(&mut tasks) {
+        *task = Some(task_of(ground, patches, slot));
     }
+    let tasks = || tasks.iter().flatten();
+    let vertices = block.vertices.chunks_exact_mut(per_patch);
+    for (task, (vertices, points)) in
+        tasks().zip(vertices.zip(block.points.chunks_exact_mut(per_patch)))
+    {
+        read_samples(task, patches.patch_depth, vertices, points);
+    }
+    let vertices = block.vertices.chunks_exact_mut(per_patch);
+    let targets = vertices.zip(block.points.chunks_exact(per_patch)).zip(&mut block.built);
+    for (task, ((vertices, points), built)) in tasks().zip(targets) {
+        for ((vertex, &point), place) in vertices.iter_mut().zip(points).zip(&mut block.places) {
+            *place = position(ground, vertex.height_m, point);
+            vertex.position = Ecef(*place).two_float();
+        }
+        *built = bound_and_hash(task.key, patches.patch_depth, vertices, &block.places);
+    }
+}
+
+fn task_of<'a>(ground: &Ground<'a>, patches: &Patches, slot: u32) -> Task<'a> {
+    let leaf = patches.leaf[slot as usize].expect("only live slots are built");
+    let (id, side) = (Id::new(leaf.diamond), usize::from(leaf.side));
+    Task {
+        page: ground.pages.get(ground.cover.pages[id][side].expect("a leaf's side is there")),
+        corners: ground.diamonds.shape(id).triangle(side),
+        key: leaf_key(ground.diamonds[id].key(), side),
+    }
+}
+
+/// Lattice points of the vertices, and all of each vertex but its position.
+fn read_samples(
+    task: &Task<'_>,
+    patch_depth: u8,
+    vertices: &mut [PatchVertex],
+    points: &mut [IVec3],
+) {
+    let [apex, start, end] = task.corners;
+    let n = segments(patch_depth).cast_signed();
+    let (to_start, to_end) = ((start - apex) / n, (end - apex) / n);
+    let places = (0..=n).flat_map(|row| (0..=row).map(move |column| (row, column)));
+    for ((row, column), (vertex, point)) in places.zip(vertices.iter_mut().zip(points)) {
+        *point = apex + to_start * (row - column) + to_end * column;
+        let at = task.page.sample_index(*point);
+        vertex.normal_oct = task.page.normals[at];
+        vertex.layers = task.page.layers[at];
+        vertex.height_m = task.page.heights_m[at];
+    }
+}
+
+fn position(ground: &Ground<'_>, height_m: f32, point: IVec3) -> DVec3 {
+    let normal = normal_of(point);
+    let ground_m = f64::from(height_m);
+    let height_m = if ground.sea && ground_m < 0.0 { 0.0 } else { ground_m };
+    ground.body.surface_from_normal(normal) + normal * height_m
+}
+
+/// Sphere and hash of a patch whose vertices lie at `places`, row by row from the apex.
+fn bound_and_hash(
+    key: u64,
+    patch_depth: u8,
+    vertices: &[PatchVertex],
+    places: &[DVec3],
+) -> BuiltPatch {
+    let last_row = &places[places.len() - 1 - segments(patch_depth) as usize..];
+    let centre = (places[0] + last_row[0] + last_row[last_row.len() - 1]) / 3.0;
+    let mut radius_m = 0.0_f64;
+    let mut chain = Chain(mix(key));
+    for (vertex, place) in vertices.iter().zip(places) {
+        radius_m = radius_m.max((*place - centre).length());
+        hash(vertex, &mut chain);
+    }
+    BuiltPatch { centre, radius_m, content: chain.0 | 1 }
 }
 
 /// Copies finished blocks into the arena, in the order of their slots.
@@ -72,48 +160,6 @@ pub fn store(patches: &mut Patches, slots: &[u32], blocks: &[Block]) {
         for (&slot, (vertices, &built)) in slots.iter().zip(done) {
             patches.fill(slot, built, vertices);
         }
-    }
-}
-
-fn build_patch(
-    ground: &Ground<'_>,
-    page: &Page,
-    (triangle, key): ([IVec3; 3], u64),
-    (patch_depth, vertices): (u8, &mut [PatchVertex]),
-) -> BuiltPatch {
-    let [apex, start, end] = triangle;
-    let n = segments(patch_depth).cast_signed();
-    let (to_start, to_end) = ((start - apex) / n, (end - apex) / n);
-    let mut places = (0..=n).flat_map(|row| (0..=row).map(move |column| (row, column)));
-    let mut chain = Chain(mix(key));
-    let corners = triangle.map(|corner| position(ground, page, corner));
-    let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-    let mut radius_m = 0.0_f64;
-    for vertex in vertices {
-        let (row, column) = places.next().expect("as many places as vertices");
-        let point = apex + to_start * (row - column) + to_end * column;
-        let ecef = position(ground, page, point);
-        radius_m = radius_m.max((ecef - centre).length());
-        *vertex = vertex_at(page, point, ecef);
-        hash(vertex, &mut chain);
-    }
-    BuiltPatch { centre, radius_m, content: chain.0 | 1 }
-}
-
-fn position(ground: &Ground<'_>, page: &Page, point: IVec3) -> DVec3 {
-    let normal = normal_of(point);
-    let ground_m = f64::from(page.heights_m[page.sample_index(point)]);
-    let height_m = if ground.sea && ground_m < 0.0 { 0.0 } else { ground_m };
-    ground.body.surface_from_normal(normal) + normal * height_m
-}
-
-fn vertex_at(page: &Page, point: IVec3, ecef: DVec3) -> PatchVertex {
-    let at = page.sample_index(point);
-    PatchVertex {
-        position: Ecef(ecef).two_float(),
-        normal_oct: page.normals[at],
-        layers: page.layers[at],
-        height_m: page.heights_m[at],
     }
 }
 

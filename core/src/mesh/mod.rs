@@ -5,7 +5,9 @@
 //! Keeps: the arena: one fixed-size slot a leaf triangle.
 //! Not here: which leaves exist (`lod`), Vulkan (`overfly_render_vk`).
 
+pub mod bounds;
 pub mod build;
+mod lists;
 pub mod patches;
 pub mod place;
 pub mod topology;

@@ -5,6 +5,7 @@
 //! Keeps: columns of fixed capacity, a free list.
 //! Not here: how a vertex is computed (`build`), the shared index pattern (`topology`).
 
+use super::bounds::{Bounds, GROUP};
 use crate::geodesy::TwoFloat;
 use glam::DVec3;
 
@@ -44,7 +45,8 @@ pub struct Leaf {
     pub side: u8,
 }
 
-/// All patches, as columns by slot.
+/// All patches, as columns by slot: 57 bytes a slot, its vertices (108 bytes at k = 0, 540 at
+/// k = 4), and 8 bytes for each group of slots.
 pub struct Patches {
     /// A leaf is 2^k triangles.
     pub patch_depth: u8,
@@ -54,10 +56,10 @@ pub struct Patches {
     pub leaf: Vec<Option<Leaf>>,
     /// Vertices of slot s: `s * vertices_per_patch ..` and as many on.
     pub vertices: Vec<PatchVertex>,
-    /// Centre of the bounding sphere, ECEF metres.
-    pub centre: Vec<DVec3>,
-    /// Radius of the bounding sphere in metres.
-    pub radius_m: Vec<f64>,
+    /// Bounding spheres, by group.
+    pub bounds: Vec<Bounds>,
+    /// How often a slot of each group was filled or given back, for who keeps what follows from it.
+    pub stamps: Vec<u64>,
     /// Hash of leaf key and vertex bytes; 0 while free.
     pub content: Vec<u64>,
     /// Slots taken since vertices were last built, given back ones among them.
@@ -90,8 +92,8 @@ impl Patches {
             vertices_per_patch,
             leaf: vec![None; slots],
             vertices: vec![PatchVertex::EMPTY; slots * vertices_per_patch as usize],
-            centre: vec![DVec3::ZERO; slots],
-            radius_m: vec![0.0; slots],
+            bounds: vec![Bounds::EMPTY; slots.div_ceil(GROUP)],
+            stamps: vec![0; slots.div_ceil(GROUP)],
             content: vec![0; slots],
             fresh: Vec::with_capacity(slots),
             is_fresh: vec![false; slots],
@@ -131,6 +133,9 @@ impl Patches {
         self.leaf[slot as usize] = None;
         self.digest = self.digest.wrapping_sub(self.content[slot as usize]);
         self.content[slot as usize] = 0;
+        let (group, at) = group_of(slot);
+        self.bounds[group].clear(at);
+        self.stamps[group] += 1;
         self.free.push(slot);
     }
 
@@ -138,8 +143,9 @@ impl Patches {
     pub fn fill(&mut self, slot: u32, built: BuiltPatch, vertices: &[PatchVertex]) {
         let (at, n) = (slot as usize, self.vertices_per_patch as usize);
         self.vertices[at * n..][..n].copy_from_slice(vertices);
-        self.centre[at] = built.centre;
-        self.radius_m[at] = built.radius_m;
+        let (group, place) = group_of(slot);
+        self.bounds[group].set(place, built.centre, built.radius_m);
+        self.stamps[group] += 1;
         self.digest = self.digest.wrapping_sub(self.content[at]).wrapping_add(built.content);
         self.content[at] = built.content;
     }
@@ -164,4 +170,9 @@ impl Patches {
         let n = self.vertices_per_patch as usize;
         &self.vertices[slot as usize * n..][..n]
     }
+}
+
+/// The group of a slot, and its place in the group.
+fn group_of(slot: u32) -> (usize, usize) {
+    (slot as usize / GROUP, slot as usize % GROUP)
 }

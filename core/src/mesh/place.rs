@@ -2,36 +2,250 @@
 //!
 //! In:    cameras, depth borders, live patches.
 //! Out:   the draws of each view, near to far; their digest.
-//! Keeps: one list a chunk and range, so that chunks are independent.
-//! Not here: matrices and draws of Vulkan (`overfly_render_vk`).
+//! Keeps: for each view one bit a slot and range, and how far the camera may move before a group
+//!        of slots must be looked at again.
+//! Not here: the geometry of that (`bounds`), matrices and draws of Vulkan (`overfly_render_vk`).
+//!
+//! The result is what testing every slot in every frame gives, to the last bit: a group is passed
+//! over only while none of its bits can have changed and none of its slots has. 2.6 bytes a slot
+//! and view, and 4 for each range that a list has room for.
 
+use super::bounds::{Borders, GROUP, Mask, RANGES_MAX, Sides};
+use super::lists::{expand, without_lowest};
 use super::patches::Patches;
 use crate::camera::Camera;
 use crate::digest::{Chain, bits, mix};
 use crate::frame::data::{RangeDraws, ViewDraws};
 use crate::settings::DepthSettings;
 
-/// Patch slots in one chunk: some 10 µs of work.
-pub const CHUNK: usize = 1024;
+/// Groups in one block.
+const GROUPS: usize = BLOCK_SLOTS / GROUP;
+
+/// Patch slots in one block: some 10 µs of work when all are looked at.
+const BLOCK_SLOTS: usize = 1024;
+
+/// Blocks in one chunk of the loop over [`Placed::begin`]'s.
+pub const BLOCK_GRAIN: usize = 2;
+
+/// Slots of a list in one chunk: some 2 µs of work.
+pub const LIST_GRAIN: usize = 8192;
 
 /// Ranges overlap by this share of their border, so that no pixel falls between two.
 pub const OVERLAP: f64 = 1e-3;
 
-/// Most depth ranges of a view.
-pub const RANGES_MAX: usize = 8;
-
-/// Scratch of one chunk of slots: the slots that touch each range.
-pub struct Block {
-    lists: Vec<Vec<u32>>,
-    digest: u64,
+/// One group of slots in one view, as of when they were last looked at.
+#[derive(Clone, Copy)]
+struct Group {
+    masks: [Mask; RANGES_MAX],
+    /// Sum of the hashes of what is drawn.
+    sum: u64,
+    /// Stamp of the slots; `NEVER` before the first look.
+    stamp: u64,
+    /// The odometers then.
+    at: Odometers,
+    per_m: f64,
+    per_radian: f64,
 }
 
-impl Block {
-    /// As many blocks as `patches` slots need, with room in every list.
-    pub fn for_patches(patches: u32, ranges: usize) -> Vec<Self> {
-        let block =
-            || Self { lists: (0..ranges).map(|_| Vec::with_capacity(CHUNK)).collect(), digest: 0 };
-        (0..(patches as usize).div_ceil(CHUNK)).map(|_| block()).collect()
+const NEVER: u64 = u64::MAX;
+
+/// 1024 slots of one view; blocks are independent.
+#[derive(Clone)]
+pub struct Block {
+    groups: [Group; GROUPS],
+    sum: u64,
+    counts: [u32; RANGES_MAX],
+    /// Where its slots begin in each range's list.
+    starts: [u32; RANGES_MAX],
+}
+
+/// How far a camera has come: upper bounds, so they only ever grow.
+#[derive(Clone, Copy, Default)]
+struct Odometers {
+    path_m: f64,
+    turn_radians: f64,
+}
+
+/// What the blocks of one view are placed by.
+#[derive(Clone, Copy)]
+pub struct Aim {
+    borders: Borders,
+    now: Odometers,
+}
+
+/// One view's draws as bits.
+pub struct Placed {
+    blocks: Vec<Block>,
+    aim: Option<Aim>,
+}
+
+impl Group {
+    const EMPTY: Self = Self {
+        masks: [0; RANGES_MAX],
+        sum: 0,
+        stamp: NEVER,
+        at: Odometers { path_m: 0.0, turn_radians: 0.0 },
+        per_m: 0.0,
+        per_radian: 0.0,
+    };
+
+    /// Whether no bit can have changed. A NaN, from an odometer without end, says no.
+    fn holds(&self, stamp: u64, now: &Odometers) -> bool {
+        let moved_m = now.path_m - self.at.path_m;
+        let turned = now.turn_radians - self.at.turn_radians;
+        let spent = moved_m * (1.0 + turned) * self.per_m + turned * self.per_radian;
+        // The thousandth is for the rounding of this line and the one above.
+        self.stamp == stamp && spent < 0.999
+    }
+
+    /// Looks at the group anew.
+    fn look(&mut self, (patches, group): (&Patches, usize), aim: &Aim, sides: &mut Sides) {
+        let seen = patches.bounds[group].seen(&aim.borders, sides);
+        let content = &patches.content[group * GROUP..];
+        let stamp = patches.stamps[group];
+        if self.stamp != stamp {
+            // The hashes of the old contents are gone with them: the sum begins anew.
+            (self.masks, self.sum, self.stamp) = ([0; RANGES_MAX], 0, stamp);
+        }
+        for (range, (old, new)) in (0_u64..).zip(self.masks.into_iter().zip(seen.masks)) {
+            let hashes = |mask| sum_of(mask, |bit| mix(content[bit].wrapping_add(range)));
+            let gone = hashes(old & !new);
+            self.sum = self.sum.wrapping_add(hashes(new & !old)).wrapping_sub(gone);
+        }
+        self.masks = seen.masks;
+        self.at = aim.now;
+        (self.per_m, self.per_radian) = (seen.per_m, seen.per_radian);
+    }
+}
+
+impl Odometers {
+    /// Both further, rounded up: so that a difference never falls short of the way between.
+    fn advance(&mut self, (path_m, turn_radians): (f64, f64)) {
+        if path_m > 0.0 {
+            self.path_m = (self.path_m + path_m).next_up();
+        }
+        if turn_radians > 0.0 {
+            self.turn_radians = (self.turn_radians + turn_radians).next_up();
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.path_m.is_finite() && self.turn_radians.is_finite()
+    }
+}
+
+impl Placed {
+    /// Bits for `patches` slots; nothing has been looked at.
+    pub fn new(patches: u32) -> Self {
+        let block = Block {
+            groups: [Group::EMPTY; GROUPS],
+            sum: 0,
+            counts: [0; RANGES_MAX],
+            starts: [0; RANGES_MAX],
+        };
+        Self { blocks: vec![block; (patches as usize).div_ceil(BLOCK_SLOTS)], aim: None }
+    }
+
+    /// The view's camera has moved: what to place by, and the blocks to place, each by
+    /// [`place_blocks`].
+    pub fn begin(&mut self, view: &ViewDraws, patches: &Patches) -> (Aim, &mut [Block]) {
+        let ranges = view.ranges.iter().map(|range| (range.near_m, range.far_m));
+        let borders = Borders::new(&view.camera, ranges);
+        let mut now = Odometers::default();
+        match &self.aim {
+            Some(last) if last.borders.same_ranges(&borders) && last.now.is_finite() => {
+                now = last.now;
+                now.advance(borders.moved(&last.borders));
+            }
+            _ => self.forget(),
+        }
+        let aim = Aim { borders, now };
+        self.aim = Some(aim);
+        let used = (patches.used_end() as usize).div_ceil(BLOCK_SLOTS);
+        (aim, &mut self.blocks[..used])
+    }
+
+    fn forget(&mut self) {
+        let groups = self.blocks.iter_mut().flat_map(|block| &mut block.groups);
+        groups.for_each(|group| group.stamp = NEVER);
+    }
+
+    /// Makes the view's lists as long as they must be; each is then to be written by
+    /// [`Placed::list`]. Returns the digest of the draws.
+    pub fn count(&mut self, view: &mut ViewDraws) -> u64 {
+        let mut sum = 0_u64;
+        let mut ends = [0; RANGES_MAX];
+        for block in &mut self.blocks {
+            sum = sum.wrapping_add(block.sum);
+            block.starts = ends;
+            ends.iter_mut().zip(block.counts).for_each(|(end, count)| *end += count);
+        }
+        for (range, end) in view.ranges.iter_mut().zip(ends) {
+            range.patches.resize(end as usize, 0);
+        }
+        chained(sum, &view.camera)
+    }
+
+    /// Writes a part of a range's list: from its entry `first` on, as many as `out` is long.
+    pub fn list(&self, range: usize, first: usize, out: &mut [u32]) {
+        let start_of = |block: &Block| block.starts[range] as usize;
+        let after = self.blocks.partition_point(|block| start_of(block) <= first);
+        let at = after.checked_sub(1).expect("the first block begins at entry 0");
+        let mut skip = first - start_of(&self.blocks[at]);
+        let groups = self.blocks[at..].iter().flat_map(|block| &block.groups);
+        let mut written = 0;
+        for (mask, group) in groups.map(|group| group.masks[range]).zip(at * GROUPS..) {
+            if written == out.len() {
+                break;
+            }
+            if mask == 0 {
+                continue;
+            }
+            let mask = if skip == 0 { mask } else { without_lowest(mask, &mut skip) };
+            let base = u32::try_from(group * GROUP).expect("slots are counted in u32");
+            written += expand(mask, base, &mut out[written..]);
+        }
+    }
+}
+
+/// Sum of a hash of each set bit.
+fn sum_of(mut mask: Mask, hash: impl Fn(usize) -> u64) -> u64 {
+    let mut sum = 0_u64;
+    while mask != 0 {
+        sum = sum.wrapping_add(hash(mask.trailing_zeros() as usize));
+        mask &= mask - 1;
+    }
+    sum
+}
+
+/// The digest of draws whose hashes add up to `sum`, for a camera.
+fn chained(sum: u64, camera: &Camera) -> u64 {
+    let mut chain = Chain(sum);
+    for vector in [camera.eye.0, camera.right, camera.up, camera.forward] {
+        vector.to_array().into_iter().for_each(|c| chain.add(bits(c)));
+    }
+    chain.add(bits(camera.pixels_per_radian));
+    chain.0
+}
+
+/// Places the slots of some blocks, the first of which is block `first`.
+pub fn place_blocks(patches: &Patches, aim: &Aim, first: usize, blocks: &mut [Block]) {
+    let mut sides = Sides::EMPTY;
+    for (block, at) in blocks.iter_mut().zip(first..) {
+        let mut looked = false;
+        for (group, at) in block.groups.iter_mut().zip(at * GROUPS..patches.stamps.len()) {
+            if !group.holds(patches.stamps[at], &aim.now) {
+                group.look((patches, at), aim, &mut sides);
+                looked = true;
+            }
+        }
+        if looked {
+            let sums = block.groups.iter().map(|group| group.sum);
+            block.sum = sums.fold(0, u64::wrapping_add);
+            for (range, count) in block.counts.iter_mut().enumerate() {
+                *count = block.groups.iter().map(|group| group.masks[range].count_ones()).sum();
+            }
+        }
     }
 }
 
@@ -55,65 +269,5 @@ pub fn empty_draws(camera: Camera, depth: &DepthSettings, patches: u32) -> ViewD
     ViewDraws { camera, ranges: ranges_of(camera.near_m, depth).map(range).collect() }
 }
 
-/// Places the slots of one chunk in the ranges of one view.
-pub fn place_block(patches: &Patches, view: &ViewDraws, chunk: usize, block: &mut Block) {
-    block.lists.iter_mut().for_each(Vec::clear);
-    block.digest = 0;
-    let camera = &view.camera;
-    let end = (patches.used_end() as usize).min((chunk + 1) * CHUNK);
-    for slot in chunk * CHUNK..end {
-        if patches.leaf[slot].is_none() {
-            continue;
-        }
-        let (to_centre, radius_m) = (patches.centre[slot] - camera.eye.0, patches.radius_m[slot]);
-        if camera.side_planes.iter().any(|plane| plane.dot(to_centre) < -radius_m) {
-            continue;
-        }
-        let depth_m = camera.forward.dot(to_centre);
-        for (index, range) in view.ranges.iter().enumerate() {
-            if depth_m + radius_m >= range.near_m && depth_m - radius_m <= range.far_m {
-                block.lists[index].push(u32::try_from(slot).expect("slots are counted in u32"));
-                let tag = mix(patches.content[slot].wrapping_add(index as u64));
-                block.digest = block.digest.wrapping_add(tag);
-            }
-        }
-    }
-}
-
-/// Joins the chunks of one view in their order. Returns the digest of its draws.
-pub fn join(blocks: &[Block], view: &mut ViewDraws) -> u64 {
-    let mut sum = 0_u64;
-    for range in &mut view.ranges {
-        range.patches.clear();
-    }
-    for block in blocks {
-        sum = sum.wrapping_add(block.digest);
-        for (range, list) in view.ranges.iter_mut().zip(&block.lists) {
-            range.patches.extend_from_slice(list);
-        }
-    }
-    let camera = &view.camera;
-    let mut chain = Chain(sum);
-    for vector in [camera.eye.0, camera.right, camera.up, camera.forward] {
-        vector.to_array().into_iter().for_each(|c| chain.add(bits(c)));
-    }
-    chain.add(bits(camera.pixels_per_radian));
-    chain.0
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_cover_all_depths_and_overlap_slightly() {
-        let depth = DepthSettings { splits_m: vec![30.0, 1e4] };
-        let ranges: Vec<_> = ranges_of(0.1, &depth).collect();
-        assert_eq!(ranges.len(), 3);
-        assert_eq!(ranges[0].0, 0.1);
-        assert_eq!(ranges[2].1, f64::INFINITY);
-        for pair in ranges.windows(2) {
-            assert!(pair[0].1 > pair[1].0 && pair[0].1 < pair[1].0 * 1.003);
-        }
-    }
-}
+mod tests;

@@ -1,0 +1,163 @@
+//! The engine on the LEB workload: the planet's own split and merge over another rule.
+//!
+//! In:    a preset, eyes.
+//! Out:   the mesh, its leaves, deepest leaf and digest.
+//! Keeps: [`Engine`]: a mesh and the eye that it was last refined for.
+//! Not here: the reference (`recursion`), times (the bench).
+//!
+//! The workload's square is quadrant 0 of the octahedron, unfolded: its two root triangles are the
+//! base diamond's. Diamonds of the other quadrants have priority 0; those that conformity splits
+//! there are not counted.
+
+use super::recursion::Tally;
+use super::workload::Preset;
+use overfly_core::datasource::PageKey;
+use overfly_core::digest::mix;
+use overfly_core::lattice::{RADIUS, unfold};
+use overfly_core::lod::agenda::{Band, Verdict};
+use overfly_core::lod::refine::{ALONE, Knobs, Mesh, Refinement, Rule};
+use overfly_core::lod::wheel::{Family, Lasts, Motion};
+use overfly_core::lod::{DiamondId, Diamonds};
+
+/// Priority at which a split is wanted: edge² over T²·distance².
+const TOLERANCE: f64 = 1.0;
+
+/// The workload's rule for one eye.
+struct LebRule {
+    threshold_squared: f64,
+    eye: [f64; 3],
+    /// Distance at which a diamond of each level is on the threshold.
+    reach: [f64; 64],
+}
+
+impl LebRule {
+    fn new(threshold_squared: f64) -> Self {
+        let edge_squared = |level: usize| 2.0 / (1_u64 << level) as f64;
+        let reach = |level: usize| (edge_squared(level) / threshold_squared).sqrt();
+        Self { threshold_squared, eye: [0.0; 3], reach: core::array::from_fn(reach) }
+    }
+
+    fn judge(&self, diamonds: &Diamonds, id: DiamondId, _: Band) -> Verdict {
+        let record = &diamonds[id];
+        let (centre, level) = (record.centre(), usize::from(record.level()));
+        if centre.x < 0 || centre.y < 0 {
+            let is_split = record.is_split();
+            return if is_split { Verdict::Urgent(0.0) } else { Verdict::Certain(Lasts::FOREVER) };
+        }
+        let (u, v) = unfold(0, centre);
+        const UNIT: f64 = 1.0 / RADIUS as f64;
+        let [eye_x, eye_y, h] = self.eye;
+        let (dx, dy) = (f64::from(u) * UNIT - eye_x, f64::from(v) * UNIT - eye_y);
+        let distance_squared = (dx * dx + dy * dy) + h * h;
+        let edge_squared = f64::from_bits((1024 - level as u64) << 52);
+        let wanted = edge_squared > self.threshold_squared * distance_squared;
+        if wanted != record.is_split() {
+            return Verdict::Urgent(edge_squared / (self.threshold_squared * distance_squared));
+        }
+        let (distance, reach) = (distance_squared.sqrt(), self.reach[level]);
+        let (slack, family) = if wanted {
+            (reach - distance, Family::Needed)
+        } else {
+            (distance - reach, Family::Far)
+        };
+        let scale_m = if distance > reach { distance } else { reach };
+        Verdict::Certain(Lasts { family, scale_m, slack_m: slack - 1e-12 * scale_m })
+    }
+}
+
+impl Rule for LebRule {
+    fn judge(&self, diamonds: &Diamonds, id: DiamondId, band: Band) -> Verdict {
+        self.judge(diamonds, id, band)
+    }
+
+    fn kids_ready(&self, _: &Diamonds, _: DiamondId) -> Result<(), PageKey> {
+        Ok(())
+    }
+
+    fn follow_split(&mut self, _: &Diamonds, _: DiamondId) {}
+
+    fn prepare_merge(&mut self, _: &Diamonds, _: DiamondId) {}
+}
+
+/// A mesh that follows the eye.
+pub struct Engine {
+    /// The mesh.
+    pub mesh: Mesh,
+    rule: LebRule,
+    before: Option<[f64; 3]>,
+    /// Whether every diamond is judged in every frame.
+    pub judges_all: bool,
+}
+
+impl Engine {
+    /// The base mesh, with room for a preset's flights.
+    pub fn new(preset: Preset) -> Self {
+        let leaves = u32::try_from(preset.cruise_start().0).expect("at most 16 million");
+        let unlimited = Knobs {
+            tolerance_px: TOLERANCE,
+            leaves_max: u32::MAX,
+            splits_max: u32::MAX,
+            merges_max: u32::MAX,
+            level_max: u8::MAX,
+        };
+        // A diamond has two leaves but on the border, where it has one.
+        let mut mesh = Mesh::new(leaves + leaves / 4, unlimited);
+        mesh.create_base();
+        let rule = LebRule::new(preset.threshold_squared());
+        Self { mesh, rule, before: None, judges_all: false }
+    }
+
+    /// One frame: the mesh is the workload's for this eye when it returns.
+    pub fn frame(&mut self, eye: [f64; 3]) -> Refinement { self.first_half(eye); self.second_half() }
+    pub fn first_half(&mut self, eye: [f64; 3]) -> u32 {
+        let motion = self.before.filter(|_| !self.judges_all).map(|was| {
+            let [dx, dy, dz] = [0, 1, 2].map(|axis| eye[axis] - was[axis]);
+            Motion { path_m: (dx * dx + dy * dy + dz * dz).sqrt(), ..Motion::default() }
+        });
+        (self.before, self.rule.eye) = (Some(eye), eye);
+        let rule = &self.rule;
+        let judge = |diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band);
+        self.mesh.prioritise(&judge, motion, ALONE)
+    }
+    pub fn second_half(&mut self) -> Refinement {
+        self.mesh.refine(&mut self.rule)
+    }
+
+    /// Leaves and deepest leaf of the square.
+    pub fn tally(&self) -> Tally {
+        self.digest().0
+    }
+
+    /// The same, and the digest of the workload's description.
+    pub fn digest(&self) -> (Tally, u64) {
+        let diamonds = &self.mesh.diamonds;
+        let (mut tally, mut sum) = (Tally { leaves: 0, deepest: 0 }, 0_u64);
+        for id in diamonds.ids().filter(|&id| !diamonds[id].is_split()) {
+            let shape = diamonds.shape(id);
+            for side in (0..2).filter(|&side| diamonds[id].has_side(side)) {
+                let triangle = shape.triangle(side);
+                if triangle.iter().any(|corner| corner.x < 0 || corner.y < 0) {
+                    continue;
+                }
+                let depth = u32::from(shape.level) + 1;
+                tally.leaves += 1;
+                tally.deepest = tally.deepest.max(depth);
+                let (x, y) = triangle.iter().fold((0_u64, 0_u64), |(x, y), &corner| {
+                    let (u, v) = unfold(0, corner);
+                    (x + u64::from(u.unsigned_abs()), y + u64::from(v.unsigned_abs()))
+                });
+                // The lattice is 2³⁰ a side; the digest counts in 2⁻²⁴.
+                let key = u64::from(depth) << 58 ^ x >> 6 << 29 ^ y >> 6;
+                sum = sum.wrapping_add(mix(key));
+            }
+        }
+        (tally, sum)
+    }
+
+    /// Bytes in use: records, priorities, seats.
+    pub fn bytes(&self) -> usize {
+        let diamonds = &self.mesh.diamonds;
+        let records = diamonds.used_end();
+        records as usize * 64 + self.mesh.agenda.bytes(records)
+    }
+}
