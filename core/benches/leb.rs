@@ -30,7 +30,9 @@ fn main() {
         match word.parse::<Preset>() {
             Ok(preset) => presets.push(preset),
             Err(fault) => {
-                eprintln!("leb: {fault}\nusage: cargo bench -p overfly-core --bench leb -- [PRESET…]");
+                eprintln!(
+                    "leb: {fault}\nusage: cargo bench -p overfly-core --bench leb -- [PRESET…]"
+                );
                 std::process::exit(2);
             }
         }
@@ -73,8 +75,12 @@ fn fly(preset: Preset, flight: Flight) -> Row {
         }));
     }
     let (tally, digest) = engine.digest();
-    let reference = leb::recursion::digest(&Rule::new(preset.threshold_squared(), flight.eye(FRAMES)));
-    assert_eq!((tally.leaves, tally.deepest, digest), (reference.0.leaves, reference.0.deepest, reference.1));
+    let reference =
+        leb::recursion::digest(&Rule::new(preset.threshold_squared(), flight.eye(FRAMES)));
+    assert_eq!(
+        (tally.leaves, tally.deepest, digest),
+        (reference.0.leaves, reference.0.deepest, reference.1)
+    );
     Row {
         preset,
         flight,

@@ -11,13 +11,16 @@
 
 use super::recursion::Tally;
 use super::workload::Preset;
+use glam::DVec3;
 use overfly_core::datasource::PageKey;
 use overfly_core::digest::mix;
 use overfly_core::lattice::{RADIUS, unfold};
 use overfly_core::lod::agenda::{Band, Verdict};
-use overfly_core::lod::refine::{ALONE, Knobs, Mesh, Refinement, Rule};
-use overfly_core::lod::wheel::{Family, Lasts, Motion};
+use overfly_core::lod::refine::{ALONE, Knobs, Mesh, Refinement, Rule, Spread};
+use overfly_core::lod::wheel::{ASIDE, Family, Lasts, Motion};
 use overfly_core::lod::{DiamondId, Diamonds};
+use overfly_jobs::{Graph, Span, StartError, Team, Workers};
+use parking_lot::Mutex;
 
 /// Priority at which a split is wanted: edge² over T²·distance².
 const TOLERANCE: f64 = 1.0;
@@ -37,7 +40,7 @@ impl LebRule {
         Self { threshold_squared, eye: [0.0; 3], reach: core::array::from_fn(reach) }
     }
 
-    fn judge(&self, diamonds: &Diamonds, id: DiamondId, _: Band) -> Verdict {
+    fn judge(&self, diamonds: &Diamonds, id: DiamondId, band: Band) -> Verdict {
         let record = &diamonds[id];
         let (centre, level) = (record.centre(), usize::from(record.level()));
         if centre.x < 0 || centre.y < 0 {
@@ -54,14 +57,50 @@ impl LebRule {
         if wanted != record.is_split() {
             return Verdict::Urgent(edge_squared / (self.threshold_squared * distance_squared));
         }
+        let ahead = band.course.dot(DVec3::new(dx, dy, -h));
         let (distance, reach) = (distance_squared.sqrt(), self.reach[level]);
-        let (slack, family) = if wanted {
-            (reach - distance, Family::Needed)
-        } else {
-            (distance - reach, Family::Far)
-        };
-        let scale_m = if distance > reach { distance } else { reach };
-        Verdict::Certain(Lasts { family, scale_m, slack_m: slack - 1e-12 * scale_m })
+        let lasts = if wanted { stays } else { comes };
+        Verdict::Certain(lasts(distance, reach, ahead))
+    }
+}
+
+/// How long a point at `distance` stays within `reach`, `ahead` of it along the course.
+///
+/// The distance along a line is convex, so on the way to where the line leaves the reach it is
+/// below its chord: at least `(reach − distance)·(1 − gone/length)` are left for going aside.
+fn stays(distance: f64, reach: f64, ahead: f64) -> Lasts {
+    let slack = reach - distance;
+    let leaves = ahead + (ahead * ahead + slack * (reach + distance)).sqrt();
+    let length = if leaves < ASIDE * slack { leaves } else { ASIDE * slack };
+    longer(Family::Needed, (slack, length), reach)
+}
+
+/// How long a point at `distance` stays beyond `reach`, `ahead` of it along the course.
+///
+/// The distance along a line is above each of its tangents: above the one where it enters the
+/// reach, of slope `root/reach`, and above the one where it starts, of slope `ahead/distance`.
+fn comes(distance: f64, reach: f64, ahead: f64) -> Lasts {
+    let slack = distance - reach;
+    let square = ahead * ahead - slack * (distance + reach);
+    let root = if square > 0.0 { square.sqrt() } else { 0.0 };
+    let length = if ahead > 0.0 && ASIDE * root > reach {
+        ahead - root
+    } else if ahead * ASIDE > distance {
+        slack * distance / ahead
+    } else {
+        ASIDE * slack
+    };
+    longer(Family::Far, (slack, length), distance)
+}
+
+/// Along the course or whatever the path, whichever lasts longer.
+fn longer(family: Family, (slack, length): (f64, f64), scale_m: f64) -> Lasts {
+    let rounding = 1e-12 * scale_m;
+    if length > 1.25 * slack {
+        let length_m = length - rounding;
+        Lasts { family: Family::Straight, scale_m: length_m, slack_m: length_m }
+    } else {
+        Lasts { family, scale_m, slack_m: slack - rounding }
     }
 }
 
@@ -107,19 +146,22 @@ impl Engine {
         Self { mesh, rule, before: None, judges_all: false }
     }
 
-    /// One frame: the mesh is the workload's for this eye when it returns.
-    pub fn frame(&mut self, eye: [f64; 3]) -> Refinement { self.first_half(eye); self.second_half() }
-    pub fn first_half(&mut self, eye: [f64; 3]) -> u32 {
+    /// One frame on this thread: the mesh is the workload's for this eye when it returns.
+    pub fn frame(&mut self, eye: [f64; 3]) -> Refinement {
+        self.frame_spread(eye, ALONE)
+    }
+
+    /// The same, with what is due judged wherever `spread` takes it.
+    pub fn frame_spread(&mut self, eye: [f64; 3], spread: Spread<'_>) -> Refinement {
         let motion = self.before.filter(|_| !self.judges_all).map(|was| {
             let [dx, dy, dz] = [0, 1, 2].map(|axis| eye[axis] - was[axis]);
-            Motion { path_m: (dx * dx + dy * dy + dz * dz).sqrt(), ..Motion::default() }
+            let step_m = DVec3::new(dx, dy, dz);
+            Motion { path_m: step_m.length(), step_m, ..Motion::default() }
         });
         (self.before, self.rule.eye) = (Some(eye), eye);
         let rule = &self.rule;
         let judge = |diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band);
-        self.mesh.prioritise(&judge, motion, ALONE)
-    }
-    pub fn second_half(&mut self) -> Refinement {
+        self.mesh.prioritise(&judge, motion, spread);
         self.mesh.refine(&mut self.rule)
     }
 
@@ -159,5 +201,45 @@ impl Engine {
         let diamonds = &self.mesh.diamonds;
         let records = diamonds.used_end();
         records as usize * 64 + self.mesh.agenda.bytes(records)
+    }
+}
+
+/// An engine whose verdicts are shared among workers.
+pub struct Shared {
+    engine: Mutex<(Engine, [f64; 3], Refinement)>,
+    graph: Graph<Mutex<(Engine, [f64; 3], Refinement)>>,
+    workers: Workers,
+}
+
+impl Shared {
+    /// An engine and as many threads beside the caller.
+    ///
+    /// # Errors
+    /// The system refused a thread, or more than 64 were asked for.
+    pub fn new(preset: Preset, threads: usize) -> Result<Self, StartError> {
+        let mut graph = Graph::new();
+        graph.stage(
+            Span("leb"),
+            &[],
+            |shared: &Mutex<(Engine, [f64; 3], Refinement)>, team: &Team<'_>| {
+                let (engine, eye, done) = &mut *shared.lock();
+                let spread: Spread<'_> = &|column, body| team.for_each_chunk(column, 256, body);
+                *done = engine.frame_spread(*eye, spread);
+            },
+        );
+        let engine = Mutex::new((Engine::new(preset), [0.0; 3], Refinement::default()));
+        Ok(Self { engine, graph, workers: Workers::new(threads)? })
+    }
+
+    /// One frame.
+    pub fn frame(&mut self, eye: [f64; 3]) -> Refinement {
+        self.engine.get_mut().1 = eye;
+        self.graph.run(&self.engine, &self.workers).expect("no stage of the workload panics");
+        self.engine.get_mut().2
+    }
+
+    /// The engine, between frames.
+    pub fn engine(&mut self) -> &mut Engine {
+        &mut self.engine.get_mut().0
     }
 }

@@ -267,7 +267,11 @@ fn refine_surface(terrain: &Terrain) {
     if mesh.diamonds.base().is_some() {
         done = mesh.refine(&mut planet);
         let most = terrain.settings.lod.wanted_max;
-        want::list(&mut mesh.lacking, planet.pages.room(planet.frame + 1).min(most), &mut output.wanted);
+        want::list(
+            &mut mesh.lacking,
+            planet.pages.room(planet.frame + 1).min(most),
+            &mut output.wanted,
+        );
     } else {
         want::roots(planet.pages, &mut output.wanted);
     }

@@ -17,14 +17,17 @@ use super::urgent::{Rank, Seating, URGENT_BINS, Urgent};
 use super::wheel::{Lasts, Motion, WHEEL_BINS, Wheels};
 use crate::columns::Column;
 use core::cmp::Ordering;
+use glam::DVec3;
 
-/// The two thresholds, in pixels.
+/// What verdicts are given against: the two thresholds, in pixels, and the course.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Band {
     /// A leaf below it is certain.
     pub leaf_px: f64,
     /// A parent above it is certain.
     pub parent_px: f64,
+    /// Direction of the course, for verdicts that last along it; zero before the first motion.
+    pub course: DVec3,
 }
 
 /// What a rule says of a diamond.
@@ -52,6 +55,9 @@ const SOON: u32 = URGENT_PARENTS + URGENT_BINS;
 /// Urgent leaves that cannot be split in this frame: tried again in the next.
 const WAITING: u32 = SOON + 1;
 
+/// Operations for which memory is loaded together.
+pub const WARM: usize = 32;
+
 /// Seats, thresholds and odometers.
 pub struct Agenda {
     /// Exact priorities of urgent diamonds in pixels; stale for all others.
@@ -62,6 +68,8 @@ pub struct Agenda {
     leaves: Urgent,
     parents: Urgent,
     due: Vec<DiamondId>,
+    /// Urgent diamonds that will be operated on, the last first.
+    ahead: Vec<DiamondId>,
 }
 
 macro_rules! seating {
@@ -79,12 +87,17 @@ impl Agenda {
     pub fn new(capacity: u32, tolerance_px: f64) -> Self {
         Self {
             priority_px: Column::new(capacity, || 0.0),
-            band: Band { leaf_px: tolerance_px.next_up(), parent_px: tolerance_px },
+            band: Band {
+                leaf_px: tolerance_px.next_up(),
+                parent_px: tolerance_px,
+                course: DVec3::ZERO,
+            },
             bins: Bins::new(WAITING + 1, capacity),
             wheels: Wheels::new(),
             leaves: Urgent::new(URGENT_LEAVES, Ordering::Greater, capacity),
             parents: Urgent::new(URGENT_PARENTS, Ordering::Less, capacity),
             due: Vec::with_capacity(capacity as usize),
+            ahead: Vec::with_capacity(capacity as usize),
         }
     }
 
@@ -93,29 +106,42 @@ impl Agenda {
         self.band
     }
 
-    /// Where every urgent diamond will be split or merged at once: loads what that touches into
-    /// the cache, so that the operations do not wait for memory one after the other.
-    pub fn warm_urgent(&mut self, diamonds: &Diamonds) {
+    /// Where every urgent diamond will be split or merged: lists the first of one role, so that
+    /// [`Self::warm_next`] can load what they touch.
+    pub fn look_ahead(&mut self, role: Role, most: u32) {
+        let set = if role == Role::Leaf { &self.leaves } else { &self.parents };
+        self.ahead.clear();
+        set.list_first(&self.bins, most as usize, &mut self.ahead);
+        self.ahead.reverse();
+    }
+
+    /// Loads what the next operations touch into the cache, all at once, so that they do not wait
+    /// for memory one after the other.
+    pub fn warm_next(&mut self, diamonds: &Diamonds) {
+        let from = self.ahead.len().saturating_sub(WARM);
         let mut list = core::mem::take(&mut self.due);
-        self.leaves.list(&self.bins, &mut list);
-        let leaves = list.len();
-        self.parents.list(&self.bins, &mut list);
+        list.extend_from_slice(&self.ahead[from..]);
+        self.ahead.truncate(from);
         let count = list.len();
         diamonds.warm(&list);
+        // A split touches its parents and their kids, a merge its kids and their parents.
         for at in 0..count {
             let record = &diamonds[list[at]];
-            if at < leaves {
-                list.extend(record.parents().into_iter().flatten());
-            } else {
+            if record.is_split() {
                 list.extend(record.kids().into_iter().flatten());
+            } else {
+                list.extend(record.parents().into_iter().flatten());
             }
         }
         diamonds.warm(&list[count..]);
         let around = list.len();
         for at in count..around {
-            let id = list[at];
-            list.extend(diamonds[id].kids().into_iter().flatten());
-            list.extend(diamonds[id].parents().into_iter().flatten());
+            let record = &diamonds[list[at]];
+            if record.is_split() {
+                list.extend(record.kids().into_iter().flatten());
+            } else {
+                list.extend(record.parents().into_iter().flatten());
+            }
         }
         diamonds.warm(&list[around..]);
         list.truncate(around);
@@ -140,14 +166,16 @@ impl Agenda {
         }
         if let Some(motion) = motion {
             wheels.advance(&motion);
+            self.band.course = wheels.course();
             wheels.pass(|bin| bins.drain(bin, due));
         } else {
             wheels.pass_all(|bin| bins.drain(bin, due));
         }
         bins.drain(SOON, due);
         bins.drain(WAITING, due);
-        self.leaves.drain(seating!(self, diamonds), &mut self.due);
-        self.parents.drain(seating!(self, diamonds), &mut self.due);
+        let Band { leaf_px, parent_px, .. } = self.band;
+        self.leaves.drain(seating!(self, diamonds), leaf_px, &mut self.due);
+        self.parents.drain(seating!(self, diamonds), parent_px, &mut self.due);
     }
 
     /// Lowers the threshold of leaves; those that may now be above it become due.
@@ -168,9 +196,9 @@ impl Agenda {
     ///
     /// # Panics
     /// In debug builds, if the leaf threshold falls or the parent threshold rises.
-    pub fn relax(&mut self, band: Band) {
-        debug_assert!(band.leaf_px >= self.band.leaf_px && band.parent_px <= self.band.parent_px);
-        self.band = band;
+    pub fn relax(&mut self, leaf_px: f64, parent_px: f64) {
+        debug_assert!(leaf_px >= self.band.leaf_px && parent_px <= self.band.parent_px);
+        self.band = Band { leaf_px, parent_px, ..self.band };
     }
 
     fn collect(&mut self) {
@@ -282,7 +310,7 @@ impl Agenda {
 
     /// Bytes in use besides the records: priorities, bins, lists.
     pub fn bytes(&self, diamonds: u32) -> usize {
-        let per_diamond = size_of::<f64>() + 3 * size_of::<DiamondId>();
+        let per_diamond = size_of::<f64>() + 4 * size_of::<DiamondId>();
         diamonds as usize * per_diamond + self.bins.bytes()
     }
 
@@ -307,9 +335,10 @@ impl Agenda {
                 return Err(format!("{id:?} sits wrongly or twice: {record:?}"));
             }
         }
-        match diamonds.ids().find(|&id| {
-            (diamonds[id].role() != Role::Interior) != seated[id.index() as usize]
-        }) {
+        match diamonds
+            .ids()
+            .find(|&id| (diamonds[id].role() != Role::Interior) != seated[id.index() as usize])
+        {
             Some(id) => Err(format!("{id:?} should sit, or not: {:?}", diamonds[id])),
             None => Ok(()),
         }

@@ -169,11 +169,7 @@ pub fn closed(diamonds: &Diamonds, cover: &Cover, patches: &Patches) -> Result<(
     one_position_each(diamonds, cover, patches)
 }
 
-fn one_position_each(
-    diamonds: &Diamonds,
-    cover: &Cover,
-    patches: &Patches,
-) -> Result<(), String> {
+fn one_position_each(diamonds: &Diamonds, cover: &Cover, patches: &Patches) -> Result<(), String> {
     let mut positions = Vec::new();
     for id in diamonds.ids() {
         let shape = diamonds.shape(id);

@@ -172,4 +172,3 @@ impl Bins {
         chunk.is_some_and(|chunk| chunk.ids.get((place % 16) as usize) == Some(&id))
     }
 }
-

@@ -152,7 +152,12 @@ impl Planet<'_> {
     }
 
     /// The page that serves triangle `side` of `id`, or will once that parent is split.
-    fn page_of(&self, diamonds: &Diamonds, id: DiamondId, side: usize) -> Result<Id<Page>, PageKey> {
+    fn page_of(
+        &self,
+        diamonds: &Diamonds,
+        id: DiamondId,
+        side: usize,
+    ) -> Result<Id<Page>, PageKey> {
         if let Some(page) = self.cover.pages[id][side] {
             return Ok(page);
         }
@@ -162,7 +167,12 @@ impl Planet<'_> {
     }
 
     /// The page that serves the kids' triangles on one side of `id`, or the key that is lacking.
-    fn page_of_kids(&self, diamonds: &Diamonds, id: DiamondId, side: usize) -> Result<Id<Page>, PageKey> {
+    fn page_of_kids(
+        &self,
+        diamonds: &Diamonds,
+        id: DiamondId,
+        side: usize,
+    ) -> Result<Id<Page>, PageKey> {
         let page = self.page_of(diamonds, id, side)?;
         let key = self.pages.get(page).key;
         if page_depth(diamonds[id].level() + 1, self.lod.patch_depth) == key.depth() {
@@ -182,7 +192,8 @@ impl Planet<'_> {
         // Above the finest grid of the root pages nothing is known but the body's whole relief.
         let mut error_m = peak_m - floor_m + self.horizon.curvature_m[1];
         if page_is_finest(level, self.lod.patch_depth) {
-            let page = self.cover.pages[id].into_iter().flatten().next().expect("a record has a side");
+            let page =
+                self.cover.pages[id].into_iter().flatten().next().expect("a record has a side");
             let page = self.pages.get(page);
             let bound = page.bound_at(centre);
             let height_m = f64::from(page.heights_m[page.sample_index(centre)]);

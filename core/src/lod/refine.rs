@@ -12,7 +12,7 @@
 //! the parent threshold; before a choice could depend on them, the threshold is moved and those
 //! that may have been passed are judged.
 
-use super::agenda::{Agenda, Band, Placement, Verdict};
+use super::agenda::{Agenda, Band, Placement, Verdict, WARM};
 use super::diamonds::{DiamondId, Diamonds, Role, Seat};
 use super::wheel::Motion;
 use crate::datasource::PageKey;
@@ -22,6 +22,9 @@ use core::cmp::Ordering;
 const BLOCK: usize = 4096;
 /// Where there are few: their records stay in the first cache until they are seated.
 const SMALL_BLOCK: usize = 256;
+
+/// Records of a mesh that is in the second cache anyway.
+const CACHED: u32 = 1 << 17;
 
 /// Share of a threshold by which the thresholds enclose the priority where both sides meet: more
 /// of it means more urgent diamonds, less of it more moves of the thresholds.
@@ -203,7 +206,10 @@ impl Mesh {
             Verdict::Certain(_) => None,
         });
         wrong.map_or(Ok(()), |(id, px)| {
-            Err(format!("{id:?} has {px} px and passes for certain: {band:?} {:?}", self.diamonds[id]))
+            Err(format!(
+                "{id:?} has {px} px and passes for certain: {band:?} {:?}",
+                self.diamonds[id]
+            ))
         })
     }
 
@@ -213,11 +219,10 @@ impl Mesh {
         self.lacking.clear();
         self.waiting_px = 0.0;
         self.judge_late(rule);
-        if self.agenda.band().parent_px <= self.knobs.tolerance_px {
-            self.agenda.warm_urgent(&self.diamonds);
-        }
         self.merge_needless(rule);
+        self.agenda.look_ahead(Role::Leaf, self.knobs.splits_max);
         while self.done.splits < self.knobs.splits_max {
+            self.warm_every(self.done.splits);
             if !self.split_first(rule) {
                 break;
             }
@@ -243,12 +248,23 @@ impl Mesh {
 
     /// Merges what the tolerance does not ask for: one exact threshold, no hysteresis.
     fn merge_needless(&mut self, rule: &mut impl Rule) {
+        self.agenda.look_ahead(Role::Parent, self.knobs.merges_max);
         while self.done.merges < self.knobs.merges_max {
             let Some(id) = self.agenda.first_parent(&mut self.diamonds) else { break };
             if self.agenda.priority_px[id] > self.knobs.tolerance_px {
                 break;
             }
+            self.warm_every(self.done.merges);
             self.merge(rule, id);
+        }
+    }
+
+    /// Where the tolerance decides, every urgent diamond is operated on: loads memory ahead.
+    fn warm_every(&mut self, operation: u32) {
+        let sure = self.agenda.band().parent_px <= self.knobs.tolerance_px;
+        let is_large = self.diamonds.live() > CACHED;
+        if sure && is_large && (operation as usize).is_multiple_of(WARM) {
+            self.agenda.warm_next(&self.diamonds);
         }
     }
 
@@ -341,22 +357,22 @@ impl Mesh {
     /// Where the budget binds, the thresholds enclose the priority at which both sides meet, no
     /// wider than need be; otherwise they return to the tolerance.
     fn relax_thresholds(&mut self) {
-        let Band { leaf_px, parent_px } = self.agenda.band();
+        let Band { leaf_px, parent_px, .. } = self.agenda.band();
         let tolerance_px = self.knobs.tolerance_px;
         let full = self.diamonds.leaves() + 2 > self.knobs.leaves_max;
         let first = self.agenda.first_leaf(&mut self.diamonds);
         let first_px = first.map_or(0.0, |id| self.agenda.priority_px[id]);
         if !full {
-            self.agenda.relax(Band { leaf_px, parent_px: tolerance_px });
+            self.agenda.relax(leaf_px, tolerance_px);
             return;
         }
         let meet_px = first_px.max(leaf_px);
         let below_px = meet_px * (1.0 - MARGIN);
         let above_px = (meet_px * (1.0 + MARGIN)).max(tolerance_px);
-        self.agenda.relax(Band {
-            leaf_px: if leaf_px < below_px * (1.0 - MARGIN) { below_px } else { leaf_px },
-            parent_px: if parent_px > above_px * (1.0 + MARGIN) { above_px } else { parent_px },
-        });
+        self.agenda.relax(
+            if leaf_px < below_px * (1.0 - MARGIN) { below_px } else { leaf_px },
+            if parent_px > above_px * (1.0 + MARGIN) { above_px } else { parent_px },
+        );
     }
 
     fn error_px_bound(&mut self) -> f64 {

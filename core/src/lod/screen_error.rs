@@ -136,6 +136,7 @@ impl Sight {
         };
         Some(Motion {
             path_m: (self.eye - before.eye).length(),
+            step_m: DVec3::ZERO,
             lift_m,
             turn: turns.fold(0.0, f64::max),
             zoom: (now - was).abs() / now.min(was),
@@ -186,7 +187,11 @@ impl Sight {
     fn look(&self, region: &Region) -> Look {
         let distance_m = self.distance_m(region);
         let nearest_m = if distance_m > self.near_m { distance_m } else { self.near_m };
-        Look { distance_m, nearest_m, error_px: region.error_m * self.pixels_per_radian / nearest_m }
+        Look {
+            distance_m,
+            nearest_m,
+            error_px: region.error_m * self.pixels_per_radian / nearest_m,
+        }
     }
 
     /// By how much the region is seen: the lesser margin before horizon and frustum, metres.

@@ -2,11 +2,12 @@
 //!
 //! In:    diamonds on the wrong side of their threshold, with exact priorities.
 //! Out:   the first of them: the greatest leaf, the least parent.
-//! Keeps: an occupancy bit for each 1/64 octave of priority, a heap of the foremost octave part.
+//! Keeps: an occupancy bit a bin, a heap of the foremost bin.
 //! Not here: those whose side is certain (`wheel`).
 //!
-//! A bin is 1/64 octave of priority: the exponent and six mantissa bits of the f64, so finding it
-//! needs no logarithm. Only the foremost bin is sorted, as a heap; ties go by level and key.
+//! Bins divide priorities around a threshold, where most of them are: 1/4096 octave within 1/4
+//! octave of it, 1/16 octave beyond. An f64's bits grow almost like its logarithm, so finding a bin
+//! needs none. Only the foremost bin is sorted, as a heap; ties go by level and key.
 
 use super::bins::Bins;
 use super::diamonds::{Diamond, DiamondId, Diamonds, Seat};
@@ -16,8 +17,10 @@ use core::cmp::Ordering;
 /// Bins of one such set.
 pub const URGENT_BINS: u32 = 64 * 64;
 
-/// Bit pattern of 2⁻²⁰ px, shifted: everything smaller but 0 shares bin 1.
-const BASE: u64 = (1023 - 20) << 6;
+/// Bits of an f64 that make 1/4096 octave, 1/16 octave and 1/4 octave.
+const FINE: u32 = 52 - 12;
+const COARSE: u32 = 52 - 4;
+const QUARTER: i64 = 1 << 50;
 
 /// A diamond's standing among others.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -40,13 +43,19 @@ impl Rank {
     }
 }
 
-/// The bin of a priority: monotone, exact to 1/64 octave.
-fn bucket_of(priority_px: f64) -> u32 {
-    if priority_px <= 0.0 {
-        return 0;
-    }
-    let step = (priority_px.to_bits() >> 46).saturating_sub(BASE).clamp(1, 64 * 64 - 1);
-    u32::try_from(step).expect("clamped to the bins")
+/// The bin of a priority, from 0 to [`URGENT_BINS`]: monotone; half of the bins are on each side
+/// of the threshold.
+#[inline]
+fn bucket_of(priority_px: f64, threshold_px: f64) -> u32 {
+    let over = priority_px.to_bits().cast_signed() - threshold_px.to_bits().cast_signed();
+    let step = if over >= QUARTER {
+        1024 + ((over - QUARTER) >> COARSE).min(1023)
+    } else if over >= -QUARTER {
+        over >> FINE
+    } else {
+        -1024 + ((over + QUARTER) >> COARSE).max(-1024)
+    };
+    u32::try_from(step + 2048).expect("clamped to the bins")
 }
 
 /// What the set works on besides itself.
@@ -83,17 +92,26 @@ pub struct Urgent {
     /// Heap of all that are in `front_bin` or beyond it.
     front: Vec<DiamondId>,
     front_bin: u32,
+    /// Where the bins are finest; changes only while the set is empty.
+    threshold_px: f64,
 }
 
 impl Urgent {
     /// An empty set over the bins from `first_bin`, whose first is the one that `wins`.
     pub fn new(first_bin: u32, wins: Ordering, capacity: u32) -> Self {
-        Self { first_bin, wins, occupied: [0; 64], front: Vec::with_capacity(capacity as usize), front_bin: URGENT_BINS }
+        Self {
+            first_bin,
+            wins,
+            occupied: [0; 64],
+            front: Vec::with_capacity(capacity as usize),
+            front_bin: URGENT_BINS,
+            threshold_px: 1.0,
+        }
     }
 
     /// Bins from the least urgent to the most.
     fn step_of(&self, priority_px: f64) -> u32 {
-        let bucket = bucket_of(priority_px);
+        let bucket = bucket_of(priority_px, self.threshold_px);
         if self.wins == Ordering::Greater { bucket } else { URGENT_BINS - 1 - bucket }
     }
 
@@ -153,8 +171,15 @@ impl Urgent {
         self.front.first().copied()
     }
 
-    /// Empties the set into `out`; the diamonds are nowhere then.
-    pub fn drain(&mut self, seating: &mut Seating<'_>, out: &mut Vec<DiamondId>) {
+    /// Empties the set into `out`; the diamonds are nowhere then. From here on bins are finest
+    /// around `threshold_px`.
+    pub fn drain(
+        &mut self,
+        seating: &mut Seating<'_>,
+        threshold_px: f64,
+        out: &mut Vec<DiamondId>,
+    ) {
+        self.threshold_px = threshold_px;
         for &id in &self.front {
             seating.diamonds[id].seat = Seat::None;
         }
@@ -203,6 +228,19 @@ impl Urgent {
         seating.diamonds[self.front[b]].place = index(b);
     }
 
+    /// Adds the content of the foremost bins to a list, the most urgent bin first, until it is as
+    /// long as `most` or more.
+    pub fn list_first(&self, bins: &Bins, most: usize, out: &mut Vec<DiamondId>) {
+        out.extend_from_slice(&self.front);
+        for (word, mut bits) in self.occupied.iter().copied().enumerate().rev() {
+            while bits != 0 && out.len() < most {
+                let bit = 63 - bits.leading_zeros();
+                bins.list(self.first_bin + index(word) * 64 + bit, out);
+                bits &= !(1 << bit);
+            }
+        }
+    }
+
     /// Adds the set's content to a list, in no order.
     pub fn list(&self, bins: &Bins, out: &mut Vec<DiamondId>) {
         out.extend_from_slice(&self.front);
@@ -215,6 +253,64 @@ impl Urgent {
     }
 }
 
+#[inline]
 fn index(at: usize) -> u32 {
     u32::try_from(at).expect("diamonds are counted in u32")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn buckets_are_monotone_and_finest_at_the_threshold() {
+        for threshold_px in [0.01, 1.0, 37.0, 1e6] {
+            let mut last = bucket_of(0.0, threshold_px);
+            assert_eq!(last, 0);
+            let mut priority_px = 1e-7;
+            while priority_px < 1e11 {
+                let bucket = bucket_of(priority_px, threshold_px);
+                assert!(bucket >= last && bucket < URGENT_BINS);
+                last = bucket;
+                priority_px *= 1.000_3;
+            }
+            assert_eq!(bucket_of(threshold_px, threshold_px), 2048);
+            assert_eq!(bucket_of(f64::INFINITY, threshold_px), bucket_of(f64::MAX, threshold_px));
+            assert!(bucket_of(threshold_px * 1.001, threshold_px) > 2048);
+            assert!(bucket_of(threshold_px * 0.999, threshold_px) < 2048);
+        }
+    }
+
+    #[test]
+    fn the_first_is_found_in_any_order_of_insertion_and_removal() {
+        for wins in [Ordering::Greater, Ordering::Less] {
+            let mut diamonds = Diamonds::new(4);
+            let base = diamonds.create_base();
+            let mut priority_px = Column::new(4, || 0.0);
+            let mut bins = Bins::new(URGENT_BINS, 4);
+            for (rotation, given) in [[3.0, 1.0, 1.0, 0.0], [1.0, 1.0001, 1.0002, 9.0]]
+                .into_iter()
+                .flat_map(|given| (0..4).map(move |rotation| (rotation, given)))
+            {
+                let mut set = Urgent::new(0, wins, 4);
+                base.iter().zip(given).for_each(|(&id, px)| priority_px[id] = px);
+                let mut expected = base;
+                let seating = &mut Seating {
+                    diamonds: &mut diamonds,
+                    bins: &mut bins,
+                    priority_px: &priority_px,
+                };
+                expected.sort_by(|&a, &b| match wins {
+                    Ordering::Greater => seating.order(b, a),
+                    _ => seating.order(a, b),
+                });
+                (0..4).for_each(|i| set.push(seating, base[(i + rotation) % 4]));
+                for id in expected {
+                    assert_eq!(set.first(seating), Some(id));
+                    set.remove_from_front(seating, id);
+                }
+                assert_eq!(set.first(seating), None);
+            }
+        }
+    }
 }

@@ -10,8 +10,14 @@
 //! `path/u + turn + drift` is an odometer that serves them all. Deadlines on it lie in timing
 //! wheels of 32 slots, one wheel an octave of slack over u: rounded down by at most 1/16 of the
 //! slack, never up. A frame reads a handful of odometers and empties the slots that they passed.
+//!
+//! Eyes mostly fly straight. A rule that knows the distance along the course may say how far the
+//! eye can go on it, all paths included that stray from it a little: `forward + 8·aside < length`.
+//! When the course turns by more than half a degree a new one begins; verdicts given on the one
+//! before it count on, and those of the one before that become due.
 
 use core::ops::Range;
+use glam::DVec3;
 
 /// What makes a verdict last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -22,7 +28,15 @@ pub enum Family {
     Hidden,
     /// A parent that a view needs: path, turns, lift and the parent threshold's rise.
     Needed,
+    /// A leaf or a parent, counted along the course: neither turns nor thresholds.
+    Straight,
 }
+
+/// What a metre aside of the course counts.
+pub const ASIDE: f64 = 8.0;
+
+/// Cosine of half a degree: a course is kept while the eye's steps are this close to it.
+const SAME_COURSE: f64 = 0.999_962;
 
 /// For how much motion a verdict is certain.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -46,6 +60,8 @@ impl Lasts {
 pub struct Motion {
     /// Way of the eye, metres.
     pub path_m: f64,
+    /// The same as a vector; zero where there are several eyes and verdicts know no course.
+    pub step_m: DVec3,
     /// Change of the horizon's tangent length, metres.
     pub lift_m: f64,
     /// Change of a frustum plane's unit normal, radians or more.
@@ -64,6 +80,7 @@ impl Motion {
     pub fn most(self, other: Self) -> Self {
         Self {
             path_m: self.path_m.max(other.path_m),
+            step_m: DVec3::ZERO,
             lift_m: self.lift_m.max(other.lift_m),
             turn: self.turn.max(other.turn),
             zoom: self.zoom.max(other.zoom),
@@ -71,15 +88,28 @@ impl Motion {
     }
 }
 
-const FAMILIES: usize = 3;
+const FAMILIES: usize = 5;
+const STRAIGHT: usize = Family::Straight as usize;
 const CLASSES: usize = 64;
 const OCTAVES: usize = 16;
-const SLOTS: usize = 32;
+const SLOT_BITS: u64 = 3;
+const SLOTS: usize = 1 << SLOT_BITS;
 /// Class 0 has u = 2⁻²⁴ m; the last 2³⁹ m, three times the way to the sun.
 const CLASS_BIAS: i64 = 24;
 
+/// A straight line and how far the eye has gone along and aside of it.
+#[derive(Clone, Copy, Default)]
+struct Course {
+    axis: DVec3,
+    forward_m: f64,
+    aside_m: f64,
+}
+
 /// Bins that the wheels use, from 0.
 pub const WHEEL_BINS: u32 = (FAMILIES * CLASSES * OCTAVES * SLOTS) as u32;
+
+/// Sums are rounded up by this.
+const UP: f64 = 1.0 + 1e-12;
 
 /// Odometers and wheels.
 pub struct Wheels {
@@ -88,6 +118,12 @@ pub struct Wheels {
     turn: f64,
     /// Fall of the leaf threshold and rise of the parent threshold, relative; zooms in both.
     drift: [f64; 2],
+    /// This course and the one before.
+    courses: [Course; 2],
+    /// Which of both is this one.
+    course: usize,
+    /// The course in `course` has just begun: verdicts on the one that it replaced are due.
+    is_new_course: bool,
     /// Which octaves of a class have a slot in use, by family and class.
     octaves: [u16; FAMILIES * CLASSES],
     /// Which slots are in use, by family, class and octave.
@@ -104,15 +140,41 @@ impl Wheels {
             lift_m: 0.0,
             turn: 0.0,
             drift: [0.0; 2],
+            courses: [Course::default(); 2],
+            course: 0,
+            is_new_course: false,
             octaves: [0; FAMILIES * CLASSES],
             slots: vec![0; FAMILIES * CLASSES * OCTAVES],
             readings: [0.0; FAMILIES * CLASSES],
         }
     }
 
+    /// Direction of the course; zero before the first motion.
+    pub fn course(&self) -> DVec3 {
+        self.courses[self.course].axis
+    }
+
+    /// Counts a step along both courses, and begins a new one where it leaves this one.
+    fn follow(&mut self, step_m: DVec3) {
+        for course in &mut self.courses {
+            let along_m = course.axis.dot(step_m);
+            let forward_m = if along_m > 0.0 { along_m } else { 0.0 };
+            course.forward_m += forward_m * UP;
+            let aside_m = (step_m - course.axis * forward_m).length();
+            course.aside_m += aside_m * UP + forward_m * 1e-15;
+        }
+        let length_m = step_m.length();
+        if length_m > 0.0 && self.course().dot(step_m) < SAME_COURSE * length_m {
+            self.course = 1 - self.course;
+            self.is_new_course = true;
+            let axis = step_m / length_m;
+            self.courses[self.course] = Course { axis, forward_m: 0.0, aside_m: 0.0 };
+        }
+    }
+
     /// Counts a motion. Every sum is rounded up by more than its rounding error.
     pub fn advance(&mut self, motion: &Motion) {
-        const UP: f64 = 1.0 + 1e-12;
+        self.follow(motion.step_m);
         self.path_m += motion.path_m * UP;
         self.lift_m += motion.lift_m * UP;
         self.turn += motion.turn * UP;
@@ -131,6 +193,10 @@ impl Wheels {
     }
 
     fn reading(&self, family: usize, class: usize) -> f64 {
+        if family >= STRAIGHT {
+            let Course { forward_m, aside_m, .. } = self.courses[family - STRAIGHT];
+            return (forward_m + ASIDE * aside_m) * unit_inverse(class);
+        }
         let seen = [0.0, self.lift_m, self.lift_m][family];
         let turn = [0.0, self.turn, self.turn][family];
         let drift = self.drift[family / 2];
@@ -142,7 +208,9 @@ impl Wheels {
     #[inline]
     pub fn bin_of(&self, lasts: &Lasts) -> Option<u32> {
         let class = class_of(lasts.scale_m)?;
-        let at = lasts.family as usize * CLASSES + class;
+        let family = lasts.family as usize;
+        let family = if family == STRAIGHT { family + self.course } else { family };
+        let at = family * CLASSES + class;
         let reading = self.readings[at];
         let share = lasts.slack_m * unit_inverse(class);
         let share = if share > 1.0 { 1.0 } else { share };
@@ -172,8 +240,10 @@ impl Wheels {
 
     /// Calls `empty` with every bin in use that the odometers have passed; they count as empty.
     pub fn pass(&mut self, mut empty: impl FnMut(u32)) {
+        let replaced = core::mem::take(&mut self.is_new_course).then_some(STRAIGHT + self.course);
         for at in 0..FAMILIES * CLASSES {
             let reading = self.reading(at / CLASSES, at % CLASSES);
+            let all = replaced == Some(at / CLASSES);
             let from = core::mem::replace(&mut self.readings[at], reading);
             let mut octaves = self.octaves[at];
             while octaves != 0 {
@@ -181,6 +251,7 @@ impl Wheels {
                 octaves &= octaves - 1;
                 let wheel = at * OCTAVES + octave;
                 let passed = passed_slots(tick(from, octave), tick(reading, octave));
+                let passed = if all { u32::MAX } else { passed };
                 self.empty_slots(wheel, self.slots[wheel] & passed, &mut empty);
             }
         }
@@ -188,6 +259,7 @@ impl Wheels {
 
     /// Calls `empty` with every bin in use; they count as empty.
     pub fn pass_all(&mut self, mut empty: impl FnMut(u32)) {
+        self.is_new_course = false;
         for wheel in 0..self.slots.len() {
             self.empty_slots(wheel, self.slots[wheel], &mut empty);
         }
@@ -245,7 +317,7 @@ fn octave_of(share: f64) -> Option<usize> {
 /// The tick of an octave's wheel in which a reading falls: 1/16 to 1/32 of a share of the octave.
 #[inline]
 fn tick(reading: f64, octave: usize) -> u64 {
-    let per_unit = f64::from_bits((1023 + 5 + octave as u64) << 52);
+    let per_unit = f64::from_bits((1023 + SLOT_BITS + octave as u64) << 52);
     // Saturates; readings so large are beyond what shares can be told from.
     (reading * per_unit) as u64
 }
@@ -257,8 +329,8 @@ fn passed_slots(from: u64, to: u64) -> u32 {
     if count >= SLOTS as u64 {
         return u32::MAX;
     }
-    let run = u32::try_from((1_u64 << count) - 1).expect("fewer than 32 bits");
-    run.rotate_left(u32::try_from((from + 1) % SLOTS as u64).expect("below 32"))
+    let run = ((1_u64 << count) - 1) << ((from + 1) % SLOTS as u64);
+    u32::try_from((run | run >> SLOTS) & ((1_u64 << SLOTS) - 1)).expect("one bit a slot")
 }
 
 #[cfg(test)]
@@ -289,7 +361,8 @@ mod tests {
                 let is_due = due.contains(&bin);
                 assert!(is_due || used_m < lasts.slack_m, "{lasts:?} is late: {used_m}");
                 // Classes round the scale up by at most 2, so only the path is held exactly.
-                let slow = drift == drifted && used_m + 3.0 < 0.8 * lasts.slack_m.min(lasts.scale_m);
+                let slow =
+                    drift == drifted && used_m + 3.0 < 0.8 * lasts.slack_m.min(lasts.scale_m);
                 early += u32::from(is_due && slow);
                 done += u32::from(is_due);
                 !is_due
