@@ -60,7 +60,7 @@ impl LebRule {
         let ahead = band.course.dot(DVec3::new(dx, dy, -h));
         let (distance, reach) = (distance_squared.sqrt(), self.reach[level]);
         let lasts = if wanted { stays } else { comes };
-        Verdict::Certain(lasts(distance, reach, ahead))
+        Verdict::Certain(lasts([distance, reach, ahead], band.course_m))
     }
 }
 
@@ -68,35 +68,45 @@ impl LebRule {
 ///
 /// The distance along a line is convex, so on the way to where the line leaves the reach it is
 /// below its chord: at least `(reach − distance)·(1 − gone/length)` are left for going aside.
-fn stays(distance: f64, reach: f64, ahead: f64) -> Lasts {
+fn stays([distance, reach, ahead]: [f64; 3], course_m: f64) -> Lasts {
     let slack = reach - distance;
     let leaves = ahead + (ahead * ahead + slack * (reach + distance)).sqrt();
     let length = if leaves < ASIDE * slack { leaves } else { ASIDE * slack };
-    longer(Family::Needed, (slack, length), reach)
+    longer(Family::Needed, (slack, length), (reach, course_m))
 }
 
 /// How long a point at `distance` stays beyond `reach`, `ahead` of it along the course.
 ///
-/// The distance along a line is above each of its tangents: above the one where it enters the
-/// reach, of slope `root/reach`, and above the one where it starts, of slope `ahead/distance`.
-fn comes(distance: f64, reach: f64, ahead: f64) -> Lasts {
+/// Whoever has gone `a` along and `s` aside, `a + ASIDE·s < length`, must still be beyond: the
+/// distance along the line must not fall below `reach + (length − a)/ASIDE`. The distance is a
+/// hyperbola over `a`, so it is enough to look where its slope is −1/ASIDE, or where it ends.
+fn comes([distance, reach, ahead]: [f64; 3], course_m: f64) -> Lasts {
+    /// √(1 − 1/ASIDE²), less its rounding.
+    const COSINE: f64 = 0.999_877_92;
     let slack = distance - reach;
     let square = ahead * ahead - slack * (distance + reach);
-    let root = if square > 0.0 { square.sqrt() } else { 0.0 };
-    let length = if ahead > 0.0 && ASIDE * root > reach {
-        ahead - root
-    } else if ahead * ASIDE > distance {
-        slack * distance / ahead
-    } else {
+    let length = if ahead * ASIDE <= distance {
+        // The slope is less from the start.
         ASIDE * slack
+    } else if square > 0.0 && square * (ASIDE * ASIDE) > reach * reach {
+        // The line enters the reach before its slope has become so small.
+        ahead - square.sqrt()
+    } else {
+        let passes_at = (distance * distance - ahead * ahead).sqrt();
+        ahead + ASIDE * (passes_at * COSINE - reach)
     };
-    longer(Family::Far, (slack, length), distance)
+    longer(Family::Far, (slack, length), (distance, course_m))
 }
 
-/// Along the course or whatever the path, whichever lasts longer.
-fn longer(family: Family, (slack, length): (f64, f64), scale_m: f64) -> Lasts {
+/// Along the course or whatever the path, whichever lasts longer. A course is trusted for as long
+/// as it has been held.
+fn longer(
+    family: Family,
+    (slack, length): (f64, f64),
+    (scale_m, course_m): (f64, f64),
+) -> Lasts {
     let rounding = 1e-12 * scale_m;
-    if length > 1.25 * slack {
+    if length > 1.25 * slack && slack < course_m {
         let length_m = length - rounding;
         Lasts { family: Family::Straight, scale_m: length_m, slack_m: length_m }
     } else {

@@ -1,20 +1,25 @@
-//! One run of a graph: which stage is ready, who runs it, what became of it.
+//! What a run does at the nodes of a graph: calls closures, keeps panics and times.
 //!
-//! In:    the stages, the compiled [`Plan`], the context, the workers if they are free.
-//! Out:   every stage run or skipped once; the first panic.
-//! Keeps: the plan's counters, which end a run as they began it.
-//! Not here: building the graph (`graph`), loops inside a stage (`team`).
+//! In:    the closures, the context, the workers if they are free, the cancel flag.
+//! Out:   the closures called; the first panic, whether anything was cancelled.
+//! Keeps: nothing.
+//! Not here: order (`walk`), loops inside a stage (`team`).
 
-use crate::spans::{Log, Span, SpanRecord, now_ns};
-use crate::team::{Site, Team, lane_number};
-use crate::workers::Crew;
-use crossbeam::queue::ArrayQueue;
+use crate::cancel::Cancel;
+use crate::scratch::Scratch;
+use crate::spans::{Span, SpanRecord, WaitKind, WaitRecord, now_ns};
+use crate::sync::Std;
+use crate::team::{Desk, Site, Team};
+use crate::tickets::ITEMS_MAX;
+use crate::walk::{Hand, Walk, Work};
 use parking_lot::Mutex;
 use std::any::Any;
+use std::cell::Cell;
 use std::error::Error;
 use std::fmt;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The first panic of a run. Stages that follow the panicked one, directly or not, were skipped;
 /// all others ran.
@@ -37,191 +42,194 @@ impl Error for StagePanic {}
 /// A stage as the graph keeps it.
 pub(crate) struct Stage<C> {
     pub(crate) span: Span,
-    pub(crate) run: StageFn<C>,
+    pub(crate) body: Body<C>,
 }
 
-/// The closure of a stage.
-pub(crate) type StageFn<C> = Box<dyn Fn(&C, &Team) + Send + Sync>;
-
-/// The edges of a graph as flat arrays, and the counters of a run.
-pub(crate) struct Plan {
-    /// Stages that wait for none.
-    roots: Vec<u32>,
-    /// Stage `s` is followed by `successors[first[s]..first[s + 1]]`.
-    first: Vec<usize>,
-    successors: Vec<u32>,
-    /// How many stages each waits for.
-    waits: Vec<u32>,
-    /// How many it still waits for; whoever counts to 0 sets it back to `waits`.
-    left: Vec<AtomicU32>,
-    /// A stage it waits for panicked or was skipped; whoever skips the stage sets it back.
-    doomed: Vec<AtomicBool>,
-    /// Stages that anybody may start. A queue of the graph's size rather than deques of the
-    /// workers: crossbeam's `Injector` allocates a block per 63 pushes and its `Worker` grows
-    /// above 64 entries and shrinks again, while this never allocates, cannot overflow (a stage
-    /// is in it at most once) and holds a handful of stages per frame. The many small pieces of
-    /// work are chunks, and those are counted, not queued.
-    ready: ArrayQueue<u32>,
+/// The closures of a stage.
+pub(crate) enum Body<C> {
+    /// Called once.
+    Once(OnceFn<C>),
+    /// Counts chunks; called with ranges of them.
+    Each(CountFn<C>, ChunksFn<C>),
 }
 
-impl Plan {
-    /// Compiles the edges (before, after) of a graph of `stages` stages.
-    pub(crate) fn new(stages: u32, edges: &[(u32, u32)]) -> Plan {
-        let count = stages as usize;
-        let mut waits = vec![0; count];
-        let mut first = vec![0; count + 1];
-        for &(before, after) in edges {
-            waits[after as usize] += 1;
-            first[before as usize + 1] += 1;
-        }
-        for stage in 0..count {
-            first[stage + 1] += first[stage];
-        }
-        let mut by_before = edges.to_vec();
-        by_before.sort_unstable();
-        Plan {
-            roots: (0..stages).filter(|&stage| waits[stage as usize] == 0).collect(),
-            first,
-            successors: by_before.into_iter().map(|(_, after)| after).collect(),
-            left: waits.iter().map(|&waits| AtomicU32::new(waits)).collect(),
-            doomed: (0..count).map(|_| AtomicBool::new(false)).collect(),
-            waits,
-            ready: ArrayQueue::new(count.max(1)),
-        }
-    }
+pub(crate) type OnceFn<C> = Box<dyn Fn(&C, &Team<'_>) + Send + Sync>;
+pub(crate) type CountFn<C> = Box<dyn Fn(&C) -> usize + Send + Sync>;
+pub(crate) type ChunksFn<C> = Box<dyn Fn(&C, Range<usize>, &mut [u128]) + Send + Sync>;
 
-    fn successors(&self, stage: usize) -> &[u32] {
-        &self.successors[self.first[stage]..self.first[stage + 1]]
-    }
-
-    /// Counts one predecessor of `stage` as done; `true` if it was the last.
-    fn release(&self, stage: usize) -> bool {
-        let waits = self.waits[stage];
-        // AcqRel: the last to count sees what all predecessors wrote, the flag `doomed` included.
-        let last = waits == 1 || self.left[stage].fetch_sub(1, Ordering::AcqRel) == 1;
-        if last {
-            self.left[stage].store(waits, Ordering::Relaxed);
+/// Makes a function of ranges from one of chunks, so that chunks cost no call through a pointer.
+pub(crate) fn in_ranges<C>(
+    body: impl Fn(&C, usize, &mut Scratch<'_>) + Send + Sync + 'static,
+) -> ChunksFn<C> {
+    Box::new(move |context, chunks, block| {
+        let mut block = Scratch::new(block);
+        for chunk in chunks {
+            body(context, chunk, &mut block.anew());
         }
-        last
-    }
-
-    fn push(&self, stage: u32) {
-        self.ready.push(stage).expect("a stage is ready once per run");
-    }
+    })
 }
 
-/// A run under way, on the stack of its caller.
-pub(crate) struct Run<'a, C> {
+/// The work of one run.
+pub(crate) struct Deeds<'a, C> {
     pub(crate) stages: &'a [Stage<C>],
-    pub(crate) plan: &'a Plan,
     pub(crate) context: &'a C,
-    /// `None` while the workers serve another run.
-    pub(crate) crew: Option<&'a Crew>,
-    pub(crate) log: &'a Log,
-    /// Stages neither run nor skipped.
-    pub(crate) pending: AtomicUsize,
+    pub(crate) desk: Desk<'a>,
+    pub(crate) cancel: Option<&'a Cancel>,
+    /// Something was skipped because of `cancel`.
+    pub(crate) cancelled: AtomicBool,
     pub(crate) fault: Mutex<Option<StagePanic>>,
 }
 
-impl<C: Sync> Run<'_, C> {
-    /// Makes the first stages ready and works as the caller until all are done.
-    pub(crate) fn lead(&self) {
-        for &root in &self.plan.roots {
-            self.plan.push(root);
-        }
-        if let Some(crew) = self.crew {
-            crew.announce(self.plan.roots.len().saturating_sub(1));
-        }
-        self.work(0);
+impl<C: Sync> Deeds<'_, C> {
+    fn report(&self, span: Span, payload: &(dyn Any + Send)) {
+        let message = text_of(payload);
+        self.fault.lock().get_or_insert(StagePanic { span, message });
     }
 
-    /// Works as `lane`. The caller, lane 0, stays until all is done; others leave when there is
-    /// nothing to do for a while, so that the end of a run waits for no one who sleeps.
-    pub(crate) fn work(&self, lane: usize) {
-        loop {
-            if let Some(crew) = self.crew {
-                crew.look(lane);
-            }
-            if self.pending.load(Ordering::Acquire) == 0 {
-                return;
-            }
-            if let Some(stage) = self.plan.ready.pop() {
-                self.run_on(stage, lane);
-                continue;
-            }
-            let crew = self.crew.expect("a caller alone finds a ready stage until all are done");
-            if crew.join_loop(lane) || crew.spin(lane) {
-                continue;
-            }
-            if lane != 0 {
-                return;
-            }
-            crew.sleep(lane);
+    /// A worker's part of the run, of which there may be several.
+    pub(crate) fn visited_by(&self, lane: usize, walk: &Walk<'_, Self, Std>) {
+        if let Some(log) = self.desk.log {
+            log.arrive(lane_number(lane));
+        }
+        walk.help(lane);
+        if let Some(log) = self.desk.log {
+            log.depart(lane_number(lane));
         }
     }
 
-    /// Runs a stage, then one of those that it made ready, and so on.
-    fn run_on(&self, stage: u32, lane: usize) {
-        let mut next = Some(stage);
-        while let Some(stage) = next {
-            let stage = stage as usize;
-            let doomed = &self.plan.doomed[stage];
-            let skip = doomed.load(Ordering::Relaxed);
-            if skip {
-                doomed.store(false, Ordering::Relaxed);
+    #[inline]
+    fn stage(&self, node: u32, worker: u16, hand: &mut Hand) {
+        let Stage { span, body: Body::Once(run) } = &self.stages[node as usize] else {
+            unreachable!("the plan's kind is the body's");
+        };
+        let team = Team::of(Site { desk: &self.desk, lane: worker, span: *span });
+        let Some(log) = self.desk.log else { return run(self.context, &team) };
+        log.stage_begins(node as usize, worker, self.begin_ns(hand));
+        run(self.context, &team);
+        hand.clock_ns = now_ns();
+        log.stage_ends(node as usize, hand.clock_ns);
+    }
+
+    /// The time at which what this worker does now begins.
+    fn begin_ns(&self, hand: &mut Hand) -> u64 {
+        match std::mem::take(&mut hand.clock_ns) {
+            0 => now_ns(),
+            clock_ns => clock_ns,
+        }
+    }
+}
+
+impl<C: Sync> Work for Deeds<'_, C> {
+    #[inline]
+    fn is_cancelled(&self) -> bool {
+        let cancelled = self.cancel.is_some_and(Cancel::is_cancelled);
+        if cancelled {
+            self.cancelled.store(true, Ordering::Relaxed);
+        }
+        cancelled
+    }
+
+    #[inline]
+    fn stages(
+        &self,
+        first: u32,
+        hand: &mut Hand,
+        mut follow: impl FnMut(u32) -> Option<u32>,
+    ) -> (u32, bool) {
+        let at = Cell::new(first);
+        let worker = lane_number(hand.lane);
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            loop {
+                self.stage(at.get(), worker, hand);
+                match follow(at.get()) {
+                    Some(next) => at.set(next),
+                    None => return,
+                }
             }
-            let passed = !skip && self.run_stage(stage, lane);
-            next = self.finish(stage, passed);
+        }));
+        let last = at.get();
+        if let Err(payload) = &outcome {
+            self.report(self.stages[last as usize].span, payload.as_ref());
+            if let Some(log) = self.desk.log {
+                hand.clock_ns = now_ns();
+                log.stage_ends(last as usize, hand.clock_ns);
+            }
+        }
+        (last, outcome.is_ok())
+    }
+
+    fn count(&self, node: u32, hand: &mut Hand) -> Option<usize> {
+        let Stage { span, body: Body::Each(count, _) } = &self.stages[node as usize] else {
+            unreachable!("the plan's kind is the body's");
+        };
+        if let Some(log) = self.desk.log {
+            log.stage_begins(node as usize, lane_number(hand.lane), self.begin_ns(hand));
+        }
+        let counted = catch_unwind(AssertUnwindSafe(|| {
+            let count = count(self.context);
+            assert!(count <= ITEMS_MAX, "{count} chunks are more than {ITEMS_MAX}");
+            count
+        }));
+        if let Err(payload) = &counted {
+            self.report(*span, payload.as_ref());
+            self.chunks_end(node, hand);
+        }
+        counted.ok()
+    }
+
+    fn chunks(
+        &self,
+        node: u32,
+        hand: &mut Hand,
+        claim: &mut dyn FnMut() -> Option<Range<usize>>,
+    ) -> bool {
+        let Stage { span, body: Body::Each(_, run) } = &self.stages[node as usize] else {
+            unreachable!("the plan's kind is the body's");
+        };
+        let begin_ns = if self.desk.log.is_some() { now_ns() } else { 0 };
+        let outcome = self.desk.blocks.lend(hand.lane, |block| {
+            catch_unwind(AssertUnwindSafe(|| {
+                std::iter::from_fn(&mut *claim).for_each(|chunks| run(self.context, chunks, block));
+            }))
+        });
+        if let Some(log) = self.desk.log {
+            let (worker, end_ns) = (lane_number(hand.lane), now_ns());
+            log.ticket(SpanRecord { span: *span, worker, begin_ns, end_ns });
+        }
+        if let Err(payload) = &outcome {
+            self.report(*span, payload.as_ref());
+        }
+        outcome.is_ok()
+    }
+
+    fn chunks_end(&self, node: u32, hand: &mut Hand) {
+        if let Some(log) = self.desk.log {
+            hand.clock_ns = now_ns();
+            log.stage_ends(node as usize, hand.clock_ns);
         }
     }
 
-    /// Runs one stage; `false` if it panicked.
-    fn run_stage(&self, index: usize, lane: usize) -> bool {
-        let Stage { span, run } = &self.stages[index];
-        let (span, worker) = (*span, lane_number(lane));
-        let team = Team::of(Site { crew: self.crew, lane: worker, log: self.log, span });
-        let begin_ns = now_ns();
-        let outcome = catch_unwind(AssertUnwindSafe(|| run(self.context, &team)));
-        let end_ns = now_ns();
-        self.log.stage(index, SpanRecord { span, worker, begin_ns, end_ns });
-        match outcome {
-            Ok(()) => true,
-            Err(payload) => {
-                let message = text_of(payload.as_ref());
-                self.fault.lock().get_or_insert(StagePanic { span, message });
-                false
-            }
+    #[inline]
+    fn idle(&self, hand: &mut Hand) {
+        if self.desk.log.is_some() && hand.idle_ns == 0 {
+            hand.idle_ns = now_ns();
         }
     }
 
-    /// Releases the stages after `stage`; one that became ready is returned for this worker, the
-    /// others are offered to all.
-    fn finish(&self, stage: usize, passed: bool) -> Option<u32> {
-        let mut next = None;
-        let mut offered = 0;
-        for &after in self.plan.successors(stage) {
-            if !passed {
-                self.plan.doomed[after as usize].store(true, Ordering::Relaxed);
-            }
-            if !self.plan.release(after as usize) {
-                continue;
-            }
-            if next.is_none() {
-                next = Some(after);
-            } else {
-                self.plan.push(after);
-                offered += 1;
-            }
+    #[inline]
+    fn busy(&self, hand: &mut Hand, parked: bool) {
+        if let Some(log) = self.desk.log.filter(|_| hand.idle_ns != 0) {
+            let begin_ns = std::mem::take(&mut hand.idle_ns);
+            let kind = if parked { WaitKind::Park } else { WaitKind::Spin };
+            let (worker, end_ns) = (lane_number(hand.lane), now_ns());
+            log.wait(WaitRecord { worker, kind, begin_ns, end_ns });
         }
-        let last = self.pending.fetch_sub(1, Ordering::AcqRel) == 1;
-        if let Some(crew) = self.crew {
-            crew.announce(offered);
-            if last {
-                crew.announce_end();
-            }
-        }
-        next
     }
+}
+
+/// A lane, or a number of lanes, as records store it.
+pub(crate) fn lane_number(lane: usize) -> u16 {
+    u16::try_from(lane).expect("there are at most 65 lanes")
 }
 
 /// The text of a panic, if it has one.

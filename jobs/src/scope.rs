@@ -5,12 +5,12 @@
 //! Keeps: a [`Slot`] outlives its jobs; nothing of a job remains when [`Claim::open`] returns.
 //! Not here: who wakes whom (`workers`), panics and times (`team`).
 
-use crate::wait::{Bell, spin_until};
+use crate::sync::{Bell, Pointer, Shim, Std, Word};
 use crossbeam::utils::CachePadded;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::slice;
-use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Bits of [`Slot::state`]: how many threads run the job besides its owner.
 const INSIDE: u64 = 0xFFFF;
@@ -21,25 +21,32 @@ const CLAIMED: u64 = 1 << 17;
 /// One ticket: the right of one thread to enter. The upper half of the state counts them.
 const TICKET: u64 = 1 << 32;
 
+/// How long an owner spins for those inside before it sleeps: they are busy with their last chunk,
+/// or see the end of the run and leave.
+const CLOSE_SPIN_NS: u64 = 100_000;
+
 /// A place where one job at a time is posted for others to join.
 ///
 /// Tickets are a count here and not entries of a queue: withdrawing those that nobody took is one
 /// store instead of a search, and a thread that is descheduled between taking and starting a
 /// ticket cannot exist.
-#[derive(Default)]
-pub(crate) struct Slot {
-    state: CachePadded<AtomicU64>,
+pub(crate) struct Slot<S: Shim = Std> {
+    state: CachePadded<S::Word>,
     /// Points to a `&dyn Fn(usize) + Sync` on the owner's stack. Meaningful only to those inside.
-    job: AtomicPtr<()>,
-    bell: Bell,
+    job: S::Pointer,
+    bell: S::Bell,
 }
 
-impl Slot {
+impl<S: Shim> Slot<S> {
+    /// A slot without an owner.
+    pub(crate) fn new() -> Self {
+        Slot { state: CachePadded::new(S::Word::new(0)), job: Pointer::new(), bell: Bell::new() }
+    }
+
     /// Makes the calling thread the slot's owner; `None` while there is another.
-    pub(crate) fn claim(&self) -> Option<Claim<'_>> {
-        let free = self.state.compare_exchange(0, CLAIMED, Ordering::Acquire, Ordering::Relaxed);
+    pub(crate) fn claim(&self) -> Option<Claim<'_, S>> {
         // Lazily: a claim that was never won must not exist, for its drop frees the slot.
-        free.is_ok().then(|| Claim { slot: self })
+        self.state.replace(0, CLAIMED).is_ok().then(|| Claim { slot: self })
     }
 
     /// Takes a ticket and runs the posted job as worker `lane`; `false` if there is no ticket.
@@ -49,20 +56,14 @@ impl Slot {
             if state < TICKET {
                 return false;
             }
-            let inside = state - TICKET + 1;
-            // Acquire: pairs with the store that opened the slot.
-            match self.state.compare_exchange_weak(
-                state,
-                inside,
-                Ordering::Acquire,
-                Ordering::Relaxed,
-            ) {
+            // It acquires: pairs with the store that opened the slot.
+            match self.state.replace(state, state - TICKET + 1) {
                 Ok(_) => break,
                 Err(now) => state = now,
             }
         }
         let _leave = Leave { slot: self };
-        let job = self.job.load(Ordering::Relaxed).cast_const().cast::<&(dyn Fn(usize) + Sync)>();
+        let job = self.job.get().cast_const().cast::<&(dyn Fn(usize) + Sync)>();
         // SAFETY: there was a ticket, so `Claim::open` had stored `job` before, and we count as
         // inside since the exchange, so `open` has not returned and cannot until `_leave` drops:
         // its local, and the closure which that borrows, are alive. The closure is `Sync`.
@@ -75,7 +76,7 @@ impl Slot {
         self.state.fetch_and(TICKET - 1, Ordering::Relaxed);
         // Acquire: pairs with `Leave`, so what the joiners wrote is seen by the owner.
         let empty = || self.state.load(Ordering::Acquire) & INSIDE == 0;
-        if !spin_until(empty) {
+        if !S::spin_until(CLOSE_SPIN_NS, empty) {
             self.state.fetch_or(OWNER_SLEEPS, Ordering::Relaxed);
             while !empty() {
                 self.bell.wait();
@@ -86,11 +87,11 @@ impl Slot {
 }
 
 /// Counts a joiner out, also when the job unwinds.
-struct Leave<'s> {
-    slot: &'s Slot,
+struct Leave<'s, S: Shim> {
+    slot: &'s Slot<S>,
 }
 
-impl Drop for Leave<'_> {
+impl<S: Shim> Drop for Leave<'_, S> {
     fn drop(&mut self) {
         // After this line the job may be gone; the slot is not.
         let before = self.slot.state.fetch_sub(1, Ordering::AcqRel);
@@ -101,11 +102,11 @@ impl Drop for Leave<'_> {
 }
 
 /// Ownership of a [`Slot`]; given back when dropped.
-pub(crate) struct Claim<'s> {
-    slot: &'s Slot,
+pub(crate) struct Claim<'s, S: Shim = Std> {
+    slot: &'s Slot<S>,
 }
 
-impl Claim<'_> {
+impl<S: Shim> Claim<'_, S> {
     /// Posts `job` for up to `tickets` joiners and meanwhile runs `own` on this thread. Returns, or
     /// unwinds, after the last joiner has left.
     pub(crate) fn open<R>(
@@ -117,14 +118,13 @@ impl Claim<'_> {
         let job: &(dyn Fn(usize) + Sync) = job;
         // Declared after `job` and so dropped, which closes the slot, before it.
         let close = self;
-        let erased = (&raw const job).cast_mut().cast::<()>();
-        close.slot.job.store(erased, Ordering::Relaxed);
+        close.slot.job.set((&raw const job).cast_mut().cast::<()>());
         close.slot.state.store(CLAIMED + u64::from(tickets) * TICKET, Ordering::Release);
         own()
     }
 }
 
-impl Drop for Claim<'_> {
+impl<S: Shim> Drop for Claim<'_, S> {
     fn drop(&mut self) {
         self.slot.close();
     }
@@ -135,12 +135,15 @@ pub(crate) struct Cursor {
     next: CachePadded<AtomicUsize>,
     count: usize,
     shares: usize,
+    backwards: bool,
 }
 
 impl Cursor {
-    /// A cursor over `0..count` for about `shares` threads.
-    pub(crate) fn new(count: usize, shares: usize) -> Cursor {
-        Cursor { next: CachePadded::new(AtomicUsize::new(0)), count, shares: shares.max(1) }
+    /// A cursor over `0..count` for about `shares` threads; from the last to the first, each one
+    /// for itself, if `backwards`.
+    pub(crate) fn new(count: usize, shares: usize, backwards: bool) -> Cursor {
+        let next = CachePadded::new(AtomicUsize::new(0));
+        Cursor { next, count, shares: shares.max(1), backwards }
     }
 
     /// About how many threads share the numbers; at least 1.
@@ -153,7 +156,11 @@ impl Cursor {
         let mut worked = false;
         while let Some(range) = self.take() {
             worked = true;
-            range.for_each(&mut body);
+            if self.backwards {
+                range.for_each(|number| body(self.count - 1 - number));
+            } else {
+                range.for_each(&mut body);
+            }
         }
         worked
     }
@@ -171,7 +178,8 @@ impl Cursor {
             if first >= self.count {
                 return None;
             }
-            let batch = ((self.count - first) / (4 * self.shares)).max(1);
+            let part = (self.count - first) / (4 * self.shares);
+            let batch = if self.backwards { 1 } else { part.max(1) };
             // Relaxed: the numbers carry no data; the slot orders what the bodies write.
             match self.next.compare_exchange_weak(
                 first,
@@ -197,10 +205,14 @@ pub(crate) struct Chunks<'a, A, B> {
 }
 
 impl<'a, A: Send, B: Send> Chunks<'a, A, B> {
-    /// Cuts both slices; `grain` is at least 1.
-    pub(crate) fn new(a: &'a mut [A], b: &'a mut [B], grain: usize, threads: usize) -> Self {
-        let count = a.len().div_ceil(grain);
-        let cursor = Cursor::new(count, threads.min(count));
+    /// Cuts both slices; `grain` is at least 1. `cursor` makes one for a number of chunks.
+    pub(crate) fn new(
+        a: &'a mut [A],
+        b: &'a mut [B],
+        grain: usize,
+        cursor: impl FnOnce(usize) -> Cursor,
+    ) -> Self {
+        let cursor = cursor(a.len().div_ceil(grain));
         Chunks { a: Pieces::new(a), b: Pieces::new(b), grain, cursor }
     }
 

@@ -1,17 +1,12 @@
 //! The only clock of the libraries, and the times of one run of a graph.
 //!
-//! In:    begin and end of stages and of their parallel-for tickets, from any worker.
+//! In:    what the workers wrote down during the run (`log`).
 //! Out:   [`Spans`]: records in nanoseconds since the clock's start.
 //! Keeps: buffers of fixed capacity; a run clears them and never grows them.
 //! Not here: budgets, percentiles, drawing (the host reads [`Spans`]).
 
-use crossbeam::utils::CachePadded;
-use parking_lot::Mutex;
 use std::sync::OnceLock;
 use std::time::Instant;
-
-/// Ticket records that one worker can keep per run; 20 KiB.
-const TICKETS_PER_WORKER: usize = 512;
 
 /// Nanoseconds since the clock's start, which is the first call in this process. Never falls, and
 /// is comparable between threads. Lasts 584 years.
@@ -39,15 +34,47 @@ pub struct SpanRecord {
     pub end_ns: u64,
 }
 
-/// The times of the last run of a graph. Empty before the first.
+/// How a worker waited.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum WaitKind {
+    /// It looked for work again and again.
+    Spin,
+    /// It slept, was on its way from sleep, or was never given a core.
+    Park,
+}
+
+/// A time in which a worker had nothing to do although the run was under way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct WaitRecord {
+    /// Who: 0 is the thread that called `run`, then `1..=workers`.
+    pub worker: u16,
+    /// How.
+    pub kind: WaitKind,
+    /// Start, in nanoseconds of [`now_ns`].
+    pub begin_ns: u64,
+    /// End, in nanoseconds of [`now_ns`]; not before `begin_ns`.
+    pub end_ns: u64,
+}
+
+/// The times of the last run of a graph. Empty before the first, and after a run without
+/// [recording](crate::Graph::record_spans).
 #[derive(Default)]
 pub struct Spans {
-    stages: Vec<SpanRecord>,
-    tickets: Vec<SpanRecord>,
-    dropped: u64,
+    pub(crate) stages: Vec<SpanRecord>,
+    pub(crate) tickets: Vec<SpanRecord>,
+    pub(crate) waits: Vec<WaitRecord>,
+    pub(crate) dropped: u64,
 }
 
 impl Spans {
+    /// Forgets everything and keeps the room.
+    pub(crate) fn clear(&mut self) {
+        self.stages.clear();
+        self.tickets.clear();
+        self.waits.clear();
+        self.dropped = 0;
+    }
+
     /// All records: [`Spans::stages`], then [`Spans::tickets`].
     pub fn records(&self) -> impl Iterator<Item = &SpanRecord> {
         self.stages.iter().chain(&self.tickets)
@@ -65,74 +92,20 @@ impl Spans {
         self.tickets.iter()
     }
 
+    /// What each worker waited, by worker, then by time. A worker's tickets, its stages and its
+    /// waits fill the run, up to the scheduler's own steps.
+    pub fn waits(&self) -> impl Iterator<Item = &WaitRecord> {
+        self.waits.iter()
+    }
+
     /// Wall time, in nanoseconds, of the first stage of that name; `None` if it did not run.
     pub fn stage_ns(&self, span: Span) -> Option<u64> {
         let record = self.stages.iter().find(|record| record.span == span)?;
         Some(record.end_ns - record.begin_ns)
     }
 
-    /// Number of ticket records of the last run that did not fit. Stages always fit.
+    /// Number of ticket and wait records of the last run that did not fit. Stages always fit.
     pub fn dropped(&self) -> u64 {
         self.dropped
-    }
-}
-
-/// What the workers write into during a run. Each lock has one user at a time and costs little.
-#[derive(Default)]
-pub(crate) struct Log {
-    stages: Vec<Mutex<Option<SpanRecord>>>,
-    lanes: Vec<CachePadded<Mutex<Lane>>>,
-}
-
-#[derive(Default)]
-struct Lane {
-    tickets: Vec<SpanRecord>,
-    dropped: u64,
-}
-
-impl Log {
-    /// Forgets the last run and makes room for `stages` stages on `lanes` workers and caller.
-    pub(crate) fn begin(&mut self, stages: usize, lanes: usize) {
-        self.stages.iter_mut().for_each(|stage| *stage.get_mut() = None);
-        self.stages.resize_with(stages, Mutex::default);
-        for lane in &mut self.lanes {
-            let lane = lane.get_mut();
-            lane.tickets.clear();
-            lane.dropped = 0;
-        }
-        while self.lanes.len() < lanes {
-            let tickets = Vec::with_capacity(TICKETS_PER_WORKER);
-            self.lanes.push(CachePadded::new(Mutex::new(Lane { tickets, dropped: 0 })));
-        }
-    }
-
-    /// Writes the time of the stage with that index.
-    pub(crate) fn stage(&self, stage: usize, record: SpanRecord) {
-        *self.stages[stage].lock() = Some(record);
-    }
-
-    /// Writes the time of one ticket, or counts it when the buffer is full.
-    pub(crate) fn ticket(&self, record: SpanRecord) {
-        let mut lane = self.lanes[usize::from(record.worker)].lock();
-        if lane.tickets.len() < TICKETS_PER_WORKER {
-            lane.tickets.push(record);
-        } else {
-            lane.dropped += 1;
-        }
-    }
-
-    /// Copies the finished run into `spans`.
-    pub(crate) fn collect_into(&mut self, spans: &mut Spans) {
-        spans.stages.clear();
-        spans.stages.reserve(self.stages.len());
-        spans.stages.extend(self.stages.iter_mut().filter_map(|stage| *stage.get_mut()));
-        spans.tickets.clear();
-        spans.tickets.reserve(self.lanes.len() * TICKETS_PER_WORKER);
-        spans.dropped = 0;
-        for lane in &mut self.lanes {
-            let lane = lane.get_mut();
-            spans.tickets.extend_from_slice(&lane.tickets);
-            spans.dropped += lane.dropped;
-        }
     }
 }

@@ -5,9 +5,12 @@
 //! Keeps: nothing; a loop is over when the call returns.
 //! Not here: which stage runs when (`graph`), splitting and joining (`scope`).
 
+use crate::crew::Crew;
+use crate::log::Log;
+use crate::run::lane_number;
 use crate::scope::{Chunks, Cursor};
-use crate::spans::{Log, Span, SpanRecord, now_ns};
-use crate::workers::Crew;
+use crate::scratch::{Blocks, Scratch};
+use crate::spans::{Span, SpanRecord, now_ns};
 use parking_lot::Mutex;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -21,13 +24,20 @@ pub struct Team<'a> {
     site: Option<Site<'a>>,
 }
 
-/// Where a stage runs.
-pub(crate) struct Site<'a> {
+/// What the stages of a run share.
+pub(crate) struct Desk<'a> {
     /// `None` while the workers serve another run.
     pub(crate) crew: Option<&'a Crew>,
+    /// `None` while times are not recorded.
+    pub(crate) log: Option<&'a Log>,
+    pub(crate) blocks: &'a Blocks,
+}
+
+/// Where a stage runs.
+pub(crate) struct Site<'a> {
+    pub(crate) desk: &'a Desk<'a>,
     /// The worker that runs the stage.
     pub(crate) lane: u16,
-    pub(crate) log: &'a Log,
     pub(crate) span: Span,
 }
 
@@ -49,7 +59,7 @@ impl Team<'_> {
     /// Number of workers that may help the one that runs the stage. Not for splitting: work split
     /// by it would differ between machines.
     pub fn workers(&self) -> usize {
-        self.site.as_ref().and_then(|site| site.crew).map_or(0, Crew::count)
+        self.crew().map_or(0, Crew::count)
     }
 
     /// Calls `body` for each chunk of `grain` elements with the index of its first element.
@@ -64,7 +74,7 @@ impl Team<'_> {
     ) {
         assert!(grain > 0, "a chunk holds at least one element");
         let none: &mut [()] = &mut [];
-        let chunks = Chunks::new(items, none, grain, self.workers() + 1);
+        let chunks = Chunks::new(items, none, grain, |count| self.cursor(count));
         self.spread(chunks.cursor(), &|| chunks.drain(|first, items, _| body(first, items)));
     }
 
@@ -81,7 +91,7 @@ impl Team<'_> {
     ) {
         assert!(grain > 0, "a chunk holds at least one element");
         assert_eq!(a.len(), b.len(), "both slices have one length");
-        let chunks = Chunks::new(a, b, grain, self.workers() + 1);
+        let chunks = Chunks::new(a, b, grain, |count| self.cursor(count));
         self.spread(chunks.cursor(), &|| chunks.drain(&body));
     }
 
@@ -90,8 +100,30 @@ impl Team<'_> {
     /// # Panics
     /// With the panic of a body.
     pub fn for_each_index(&self, count: usize, body: impl Fn(usize) + Sync) {
-        let cursor = Cursor::new(count, (self.workers() + 1).min(count));
+        let cursor = self.cursor(count);
         self.spread(&cursor, &|| cursor.drain(&body));
+    }
+
+    /// Lends the memory of the worker that runs the stage to `body`. Inside itself it is empty.
+    ///
+    /// # Panics
+    /// With the panic of the body.
+    pub fn scratch<R>(&self, body: impl FnOnce(&mut Scratch<'_>) -> R) -> R {
+        match &self.site {
+            Some(site) => {
+                site.desk.blocks.lend(site.lane.into(), |block| body(&mut Scratch::new(block)))
+            }
+            None => body(&mut Scratch::new(&mut [])),
+        }
+    }
+
+    fn crew(&self) -> Option<&Crew> {
+        self.site.as_ref().and_then(|site| site.desk.crew)
+    }
+
+    fn cursor(&self, count: usize) -> Cursor {
+        let chaotic = self.crew().is_some_and(|crew| crew.chaos().is_some());
+        Cursor::new(count, (self.workers() + 1).min(count), chaotic)
     }
 
     /// Runs `drain` here and on whoever takes a ticket. There are as many tickets, this thread's
@@ -103,7 +135,7 @@ impl Team<'_> {
         };
         let fault = Mutex::new(None);
         let ticket = |worker: u16| {
-            let begin_ns = now_ns();
+            let begin_ns = if site.desk.log.is_some() { now_ns() } else { 0 };
             match catch_unwind(AssertUnwindSafe(drain)) {
                 Ok(false) => return,
                 Ok(true) => {}
@@ -112,10 +144,12 @@ impl Team<'_> {
                     fault.lock().get_or_insert(payload);
                 }
             }
-            let end_ns = now_ns();
-            site.log.ticket(SpanRecord { span: site.span, worker, begin_ns, end_ns });
+            if let Some(log) = site.desk.log {
+                let end_ns = now_ns();
+                log.ticket(SpanRecord { span: site.span, worker, begin_ns, end_ns });
+            }
         };
-        match site.crew.map(|crew| (crew, crew.claim_loop(site.lane.into()))) {
+        match site.desk.crew.map(|crew| (crew, crew.claim_loop(site.lane.into()))) {
             None => ticket(site.lane),
             Some((crew, Some(claim))) => {
                 let helpers = cursor.shares() - 1;
@@ -135,9 +169,4 @@ impl Team<'_> {
             resume_unwind(payload);
         }
     }
-}
-
-/// A lane, or a number of lanes, as records store it.
-pub(crate) fn lane_number(lane: usize) -> u16 {
-    u16::try_from(lane).expect("there are at most 65 lanes")
 }

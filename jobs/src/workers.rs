@@ -1,22 +1,21 @@
-//! Worker threads: started once, asleep between runs, woken by what is posted.
+//! Worker threads: our own, the host's, or lent ones; asleep between frames.
 //!
-//! In:    a thread count; runs and parallel-fors posted by [`crate::Graph`] and [`crate::Team`].
-//! Out:   threads that join what is posted until there is nothing more.
-//! Keeps: one lane (slot, sleep flag, bell) per thread, lane 0 for whoever calls `run`.
-//! Not here: the order of stages (`run`), the lifetime of what is joined (`scope`).
+//! In:    how many, where, for how long they may spin; or the host's two callbacks.
+//! Out:   threads that join what is posted; frames.
+//! Keeps: the threads until dropped, the handles of the host's tasks while a frame is open.
+//! Not here: what workers share and how they sleep (`crew`), the order of stages (`walk`).
 
-use crate::scope::{Claim, Slot};
-use crate::wait::{Bell, spin_until};
-use crossbeam::utils::CachePadded;
+use crate::chaos::Chaos;
+use crate::crew::{Crew, CrewSize, LANES_MAX};
+use crate::frame::{Engaged, Frame};
+use crate::pin::pin_this_thread;
+use parking_lot::Mutex;
 use std::error::Error;
 use std::fmt;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::thread::{Builder, JoinHandle};
-
-/// Most threads of one [`Workers`].
-const WORKERS_MAX: usize = 64;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{Builder, JoinHandle, available_parallelism};
 
 /// Why the workers could not be started.
 #[derive(Debug)]
@@ -28,15 +27,18 @@ pub enum StartError {
     },
     /// The system refused a thread. Those already started have ended.
     Spawn(io::Error),
+    /// The system refused to bind a thread to its core. All threads have ended.
+    Pin(io::Error),
 }
 
 impl fmt::Display for StartError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             StartError::TooMany { asked } => {
-                write!(out, "{asked} workers were asked for, at most {WORKERS_MAX} are possible")
+                write!(out, "{asked} workers were asked for, at most {LANES_MAX} are possible")
             }
             StartError::Spawn(_) => write!(out, "a worker thread could not be started"),
+            StartError::Pin(_) => write!(out, "a worker thread could not be bound to its core"),
         }
     }
 }
@@ -45,58 +47,190 @@ impl Error for StartError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             StartError::TooMany { .. } => None,
-            StartError::Spawn(cause) => Some(cause),
+            StartError::Spawn(cause) | StartError::Pin(cause) => Some(cause),
         }
     }
 }
 
-/// Threads that help whoever calls [`crate::Graph::run`]. They sleep between runs; dropping ends
-/// and joins them.
+/// How [`Workers::with`] makes workers.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct WorkerOptions {
+    /// Threads beside the caller; with 0 everything runs on the caller.
+    pub count: usize,
+    /// Places for threads that the host lends with [`Workers::join_as_worker`]. `count` and
+    /// `seats` together are at most 64.
+    pub seats: usize,
+    /// Longest spin, in microseconds, before a thread without work sleeps inside a frame. A
+    /// wake-up costs 50 to 90 µs; a spinning thread takes a core from the host. With more threads
+    /// than cores, those without a core of their own never spin.
+    pub spin_us: u32,
+    /// Threads are called this, a dash and their number, from 1.
+    pub name: String,
+    /// Thread `n` (from 1) is bound to the core `pin_to_cores[n - 1]`, if there is that entry and
+    /// the system is Linux.
+    pub pin_to_cores: Vec<usize>,
+    /// A seed to disturb the schedule with: random choices and pauses, chunks one by one and from
+    /// the last to the first. Results must not change; a host's tests can show that they do not.
+    pub chaos: Option<u64>,
+}
+
+impl Default for WorkerOptions {
+    fn default() -> Self {
+        WorkerOptions {
+            count: 0,
+            seats: 0,
+            spin_us: 200,
+            name: "overfly".to_owned(),
+            pin_to_cores: Vec::new(),
+            chaos: None,
+        }
+    }
+}
+
+/// The callbacks of a host that has threads of its own.
+struct Host {
+    enqueue: Box<dyn Fn(Task) -> u64 + Send + Sync>,
+    finish: Box<dyn Fn(u64) + Send + Sync>,
+    /// What `enqueue` returned in this frame.
+    handles: Mutex<Vec<u64>>,
+}
+
+/// Threads that help whoever calls [`Graph::run`](crate::Graph::run). They sleep between frames;
+/// dropping ends and joins those that are ours.
 ///
 /// They serve one run at a time. A run that finds them busy with another, of a second host thread
 /// or from inside a stage, is done by its caller alone.
 pub struct Workers {
     crew: Arc<Crew>,
     threads: Vec<JoinHandle<()>>,
+    host: Option<Host>,
 }
 
 impl Workers {
-    /// Starts `workers` threads, 0 to 64, beside the caller. With 0 everything runs on the caller.
+    /// No workers: the caller does everything.
+    pub fn none() -> Workers {
+        Workers::unstarted(&WorkerOptions::default(), None)
+    }
+
+    /// Starts `workers` threads, 0 to 64, beside the caller.
     ///
     /// # Errors
     /// [`StartError`] if the number is too large or the system refuses a thread.
     pub fn new(workers: usize) -> Result<Workers, StartError> {
-        if workers > WORKERS_MAX {
-            return Err(StartError::TooMany { asked: workers });
+        Workers::with(WorkerOptions { count: workers, ..WorkerOptions::default() })
+    }
+
+    /// Starts threads as the options say.
+    ///
+    /// # Errors
+    /// [`StartError`] if there are too many, or the system refuses a thread or its core.
+    pub fn with(options: WorkerOptions) -> Result<Workers, StartError> {
+        let asked = options.count.saturating_add(options.seats);
+        if asked > LANES_MAX {
+            return Err(StartError::TooMany { asked });
         }
-        let crew = Arc::new(Crew::new(workers));
-        let mut started = Workers { crew, threads: Vec::with_capacity(workers) };
-        for lane in 1..=workers {
-            let crew = Arc::clone(&started.crew);
+        let mut started = Workers::unstarted(&options, None);
+        let (report, pinned) = channel();
+        for lane in 1..=options.count {
+            let core = options.pin_to_cores.get(lane - 1).copied();
+            let (crew, report) = (Arc::clone(&started.crew), report.clone());
             let thread = Builder::new()
-                .name(format!("overfly-{lane}"))
-                .spawn(move || crew.serve(lane))
+                .name(format!("{}-{lane}", options.name))
+                .spawn(move || live(&crew, lane, core, report))
                 .map_err(StartError::Spawn)?;
             started.threads.push(thread);
         }
+        drop(report);
+        pinned.iter().collect::<io::Result<()>>().map_err(StartError::Pin)?;
         Ok(started)
     }
 
-    /// Number of threads beside the caller.
+    /// Uses threads of the host: when a frame opens, `enqueue` is called with `tasks` [`Task`]s,
+    /// one after the other; when it closes, `finish` is called with what `enqueue` returned, in
+    /// the same order.
+    ///
+    /// The host may run a task on any of its threads, at once inside `enqueue`, late, or never.
+    /// `finish` need not wait for it: a task whose frame is closed returns at once, and one that
+    /// works comes back soon after `finish` is called.
+    ///
+    /// # Errors
+    /// [`StartError::TooMany`] if `tasks` is above 64.
+    pub fn host(
+        tasks: usize,
+        enqueue: impl Fn(Task) -> u64 + Send + Sync + 'static,
+        finish: impl Fn(u64) + Send + Sync + 'static,
+    ) -> Result<Workers, StartError> {
+        if tasks > LANES_MAX {
+            return Err(StartError::TooMany { asked: tasks });
+        }
+        let host = Host {
+            enqueue: Box::new(enqueue),
+            finish: Box::new(finish),
+            handles: Mutex::new(Vec::with_capacity(tasks)),
+        };
+        let options = WorkerOptions { seats: tasks, ..WorkerOptions::default() };
+        Ok(Workers::unstarted(&options, Some(host)))
+    }
+
+    fn unstarted(options: &WorkerOptions, host: Option<Host>) -> Workers {
+        let lanes = options.count + options.seats + 1;
+        let size = CrewSize {
+            own: options.count,
+            seats: options.seats,
+            spin_ns: u64::from(options.spin_us) * 1000,
+            spinners: available_parallelism().map_or(1, |cores| cores.get()),
+        };
+        let chaos = options.chaos.map(|seed| Chaos::new(seed, lanes));
+        Workers { crew: Arc::new(Crew::new(&size, chaos)), threads: Vec::new(), host }
+    }
+
+    /// Number of threads that may help the caller: own threads, seats, or the host's tasks.
     pub fn count(&self) -> usize {
         self.crew.count()
+    }
+
+    /// Opens a frame: wakes everyone at once, so that they are there when the first stage with
+    /// chunks is. Call it when a frame's serial part begins.
+    pub fn frame(&self) -> Frame<'_> {
+        Frame::wake_all(self)
+    }
+
+    /// Lends this thread until the frame that is open now closes. `false`, at once, if none is
+    /// open, if all seats are taken, or if this thread is in a frame itself or works already.
+    pub fn join_as_worker(&self) -> bool {
+        self.crew.opening().is_some_and(|opening| visit(&self.crew, opening))
     }
 
     /// What the threads and the caller share.
     pub(crate) fn crew(&self) -> &Crew {
         &self.crew
     }
+
+    /// Opens a frame; calls the host if it is the only one.
+    pub(crate) fn open_frame(&self, wake: bool) {
+        let first = self.crew.open_frame(wake);
+        let Some(host) = self.host.as_ref().filter(|_| first) else { return };
+        let Some(opening) = self.crew.opening() else { return };
+        for _ in 0..self.crew.seats() {
+            let handle = (host.enqueue)(Task { crew: Arc::clone(&self.crew), opening });
+            host.handles.lock().push(handle);
+        }
+    }
+
+    /// Closes a frame; calls the host if it was the last one.
+    pub(crate) fn close_frame(&self) {
+        if self.crew.close_frame()
+            && let Some(host) = &self.host
+        {
+            let mut handles = host.handles.lock();
+            handles.drain(..).for_each(|handle| (host.finish)(handle));
+        }
+    }
 }
 
 impl Drop for Workers {
     fn drop(&mut self) {
-        self.crew.stop.store(true, Ordering::Release);
-        self.crew.announce(self.threads.len());
+        self.crew.stop();
         for thread in self.threads.drain(..) {
             // Workers catch every panic of a stage; one that got here is reported already, and a
             // second panic inside a drop would only hide it.
@@ -105,138 +239,39 @@ impl Drop for Workers {
     }
 }
 
-/// One worker's place.
-#[derive(Default)]
-struct Lane {
-    /// The parallel-for under way on this lane.
-    posted: Slot,
-    /// [`Crew::news`] before the last look for work. Only this lane's thread uses it.
-    seen: AtomicU64,
-    /// This lane waits for its bell; who sets it to false rings.
-    asleep: AtomicBool,
-    bell: Bell,
+/// A worker's thread.
+fn live(crew: &Crew, lane: usize, core: Option<usize>, report: Sender<io::Result<()>>) {
+    let pinned = core.map_or(Ok(()), pin_this_thread);
+    let works = pinned.is_ok();
+    // Nobody listens any more if another thread was refused; then the crew stops, too.
+    let _ = report.send(pinned);
+    drop(report);
+    if works {
+        let _engaged = Engaged::new();
+        crew.serve(lane);
+    }
 }
 
-/// What all lanes share.
+fn visit(crew: &Crew, opening: u64) -> bool {
+    if Engaged::anywhere() {
+        return false;
+    }
+    let _engaged = Engaged::new();
+    crew.visit(opening)
+}
+
+/// A worker's part of one frame, for a host to run on one of its threads; see [`Workers::host`].
 ///
-/// No wake-up is lost because of one order, the same for every run, loop and end: the poster
-/// publishes, raises `news`, then reads the sleep flags; the sleeper raises its flag, then reads
-/// `news`. All four are sequentially consistent, so one of the two sees the other.
-pub(crate) struct Crew {
-    lanes: Box<[CachePadded<Lane>]>,
-    /// The run under way.
-    run: Slot,
-    /// Rises whenever there may be something new to do. The one word idle workers spin on.
-    news: CachePadded<AtomicU64>,
-    /// Not below the number of lanes asleep: saves posters the look at every lane.
-    sleepers: CachePadded<AtomicUsize>,
-    stop: AtomicBool,
+/// It may be run late or dropped, and may outlive the workers.
+pub struct Task {
+    crew: Arc<Crew>,
+    opening: u64,
 }
 
-impl Crew {
-    fn new(workers: usize) -> Crew {
-        Crew {
-            lanes: (0..=workers).map(|_| CachePadded::default()).collect(),
-            run: Slot::default(),
-            news: CachePadded::default(),
-            sleepers: CachePadded::default(),
-            stop: AtomicBool::new(false),
-        }
-    }
-
-    /// Number of lanes beside the caller's.
-    pub(crate) fn count(&self) -> usize {
-        self.lanes.len() - 1
-    }
-
-    /// Takes the workers for a run; `None` while they serve another.
-    pub(crate) fn claim_run(&self) -> Option<Claim<'_>> {
-        self.run.claim()
-    }
-
-    /// Takes the lane's slot for a parallel-for; `None` if one is under way.
-    pub(crate) fn claim_loop(&self, lane: usize) -> Option<Claim<'_>> {
-        self.lanes[lane].posted.claim()
-    }
-
-    /// Joins a parallel-for of another lane; `false` if there was none.
-    pub(crate) fn join_loop(&self, lane: usize) -> bool {
-        let others = self.lanes[lane + 1..].iter().chain(&self.lanes[..lane]);
-        let mut joined = false;
-        for other in others {
-            joined |= other.posted.join(lane);
-        }
-        joined
-    }
-
-    /// Says that up to `jobs` threads could start on something new, and wakes as many sleepers.
-    pub(crate) fn announce(&self, jobs: usize) {
-        if jobs == 0 {
-            return;
-        }
-        self.news.fetch_add(1, Ordering::SeqCst);
-        let mut jobs = jobs;
-        for lane in &self.lanes {
-            if jobs == 0 || self.sleepers.load(Ordering::SeqCst) == 0 {
-                return;
-            }
-            if self.wake(lane) {
-                jobs -= 1;
-            }
-        }
-    }
-
-    /// Says that the run is over: frees those who spin and wakes the caller if it sleeps.
-    pub(crate) fn announce_end(&self) {
-        self.news.fetch_add(1, Ordering::SeqCst);
-        self.wake(&self.lanes[0]);
-    }
-
-    fn wake(&self, lane: &Lane) -> bool {
-        let woken = lane.asleep.load(Ordering::SeqCst) && lane.asleep.swap(false, Ordering::SeqCst);
-        if woken {
-            self.sleepers.fetch_sub(1, Ordering::SeqCst);
-            lane.bell.ring();
-        }
-        woken
-    }
-
-    /// To be called before looking for work: what is posted from now on counts as news.
-    pub(crate) fn look(&self, lane: usize) {
-        self.lanes[lane].seen.store(self.news.load(Ordering::SeqCst), Ordering::Relaxed);
-    }
-
-    /// Spins until there is news since [`Crew::look`]; `false` if that took too long.
-    pub(crate) fn spin(&self, lane: usize) -> bool {
-        let seen = self.lanes[lane].seen.load(Ordering::Relaxed);
-        spin_until(|| self.news.load(Ordering::Acquire) != seen)
-    }
-
-    /// Sleeps until it is woken; returns at once if there is news since [`Crew::look`].
-    pub(crate) fn sleep(&self, lane: usize) {
-        let lane = &self.lanes[lane];
-        // Before the flag, so that the count is never below the number of flags raised.
-        self.sleepers.fetch_add(1, Ordering::SeqCst);
-        lane.asleep.store(true, Ordering::SeqCst);
-        if self.news.load(Ordering::SeqCst) == lane.seen.load(Ordering::Relaxed) {
-            while lane.asleep.load(Ordering::SeqCst) {
-                lane.bell.wait();
-            }
-        } else if lane.asleep.swap(false, Ordering::SeqCst) {
-            self.sleepers.fetch_sub(1, Ordering::SeqCst);
-        }
-    }
-
-    /// A worker's life.
-    fn serve(&self, lane: usize) {
-        loop {
-            self.look(lane);
-            if self.stop.load(Ordering::Acquire) {
-                return;
-            }
-            // The run looks again before it gives up, so the sleep starts from its last look.
-            self.run.join(lane);
-            self.sleep(lane);
-        }
+impl Task {
+    /// Works until the task's frame closes. Returns at once if it is closed already, or if this
+    /// thread is in a frame itself or works already.
+    pub fn run(self) {
+        visit(&self.crew, self.opening);
     }
 }

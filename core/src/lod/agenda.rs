@@ -17,6 +17,7 @@ use super::urgent::{Rank, Seating, URGENT_BINS, Urgent};
 use super::wheel::{Lasts, Motion, WHEEL_BINS, Wheels};
 use crate::columns::Column;
 use core::cmp::Ordering;
+use core::cell::RefCell;
 use glam::DVec3;
 
 /// What verdicts are given against: the two thresholds, in pixels, and the course.
@@ -28,6 +29,8 @@ pub struct Band {
     pub parent_px: f64,
     /// Direction of the course, for verdicts that last along it; zero before the first motion.
     pub course: DVec3,
+    /// How far the eye has gone on it, metres.
+    pub course_m: f64,
 }
 
 /// What a rule says of a diamond.
@@ -57,6 +60,16 @@ const WAITING: u32 = SOON + 1;
 
 /// Operations for which memory is loaded together.
 pub const WARM: usize = 32;
+
+/// Takes its share of a bin that will be due after some more motions: a bin's diamonds were seated
+/// over many frames and must not all be judged in one.
+fn ease(bins: &mut Bins, bin: u32, motions: f64, due: &mut Vec<DiamondId>) -> bool {
+    let share = f64::from(bins.count(bin)) / motions;
+    share >= EASED && bins.drain_some(bin, share as u32, due)
+}
+
+/// A share of a bin that is worth to be judged early.
+const EASED: f64 = 64.0;
 
 /// Seats, thresholds and odometers.
 pub struct Agenda {
@@ -91,6 +104,7 @@ impl Agenda {
                 leaf_px: tolerance_px.next_up(),
                 parent_px: tolerance_px,
                 course: DVec3::ZERO,
+                course_m: 0.0,
             },
             bins: Bins::new(WAITING + 1, capacity),
             wheels: Wheels::new(),
@@ -166,13 +180,24 @@ impl Agenda {
         }
         if let Some(motion) = motion {
             wheels.advance(&motion);
-            self.band.course = wheels.course();
-            wheels.pass(|bin| bins.drain(bin, due));
+            (self.band.course, self.band.course_m) = wheels.course();
+            // Both closures need both lists, one after the other.
+            let lists = RefCell::new((bins, due));
+            wheels.pass(
+                |bin| {
+                    let (bins, due) = &mut *lists.borrow_mut();
+                    bins.drain(bin, due);
+                },
+                |bin, motions| {
+                    let (bins, due) = &mut *lists.borrow_mut();
+                    ease(bins, bin, motions, due)
+                },
+            );
         } else {
             wheels.pass_all(|bin| bins.drain(bin, due));
         }
-        bins.drain(SOON, due);
-        bins.drain(WAITING, due);
+        self.bins.drain(SOON, &mut self.due);
+        self.bins.drain(WAITING, &mut self.due);
         let Band { leaf_px, parent_px, .. } = self.band;
         self.leaves.drain(seating!(self, diamonds), leaf_px, &mut self.due);
         self.parents.drain(seating!(self, diamonds), parent_px, &mut self.due);
@@ -203,7 +228,7 @@ impl Agenda {
 
     fn collect(&mut self) {
         let Self { bins, wheels, due, .. } = self;
-        wheels.pass(|bin| bins.drain(bin, due));
+        wheels.pass(|bin| bins.drain(bin, due), |_, _| false);
         bins.drain(SOON, due);
     }
 

@@ -32,7 +32,11 @@ const _: () = assert!(size_of::<Chunk>() == 64);
 struct Tail {
     chunk: u32,
     len: u32,
+    /// Ids in the whole bin.
+    count: u32,
 }
+
+const EMPTY: Tail = Tail { chunk: NONE, len: CHUNK, count: 0 };
 
 /// All bins.
 pub struct Bins {
@@ -48,7 +52,7 @@ impl Bins {
         let chunks = capacity / CHUNK + bins.min(capacity);
         Self {
             chunks: Vec::with_capacity(chunks as usize),
-            tails: vec![Tail { chunk: NONE, len: CHUNK }; bins as usize],
+            tails: vec![EMPTY; bins as usize],
             free: NONE,
         }
     }
@@ -71,12 +75,13 @@ impl Bins {
         if tail.len < CHUNK {
             self.chunks[tail.chunk as usize].ids[tail.len as usize] = id;
             tail.len += 1;
+            tail.count += 1;
         } else {
-            let previous = tail.chunk;
+            let Tail { chunk: previous, count, .. } = *tail;
             let chunk = self.take_chunk((bin, previous), id);
-            self.tails[bin as usize] = Tail { chunk, len: 1 };
+            self.tails[bin as usize] = Tail { chunk, len: 1, count: count + 1 };
         }
-        let Tail { chunk, len } = self.tails[bin as usize];
+        let Tail { chunk, len, .. } = self.tails[bin as usize];
         let record = &mut diamonds[id];
         debug_assert!(record.seat == Seat::None || record.seat == Seat::Bin, "drained or new");
         (record.seat, record.place) = (Seat::Bin, chunk * 16 + len - 1);
@@ -91,18 +96,18 @@ impl Bins {
         record.seat = Seat::None;
         let (chunk, at) = (place / 16, place % 16);
         let bin = self.chunks[chunk as usize].bin;
-        let Tail { chunk: tail, len } = self.tails[bin as usize];
+        let Tail { chunk: tail, len, count } = self.tails[bin as usize];
         let last = self.chunks[tail as usize].ids[len as usize - 1];
         if last != id {
             self.chunks[chunk as usize].ids[at as usize] = last;
             diamonds[last].place = place;
         }
         self.tails[bin as usize] = if len > 1 {
-            Tail { chunk: tail, len: len - 1 }
+            Tail { chunk: tail, len: len - 1, count: count - 1 }
         } else {
             let previous = self.chunks[tail as usize].previous;
             self.give_chunk_back(tail);
-            Tail { chunk: previous, len: CHUNK }
+            Tail { chunk: previous, len: CHUNK, count: count - 1 }
         };
         bin
     }
@@ -110,15 +115,28 @@ impl Bins {
     /// Empties a bin into `out`. The diamonds' seats still say [`Seat::Bin`] until they are given
     /// another: nothing may be removed in between.
     pub fn drain(&mut self, bin: u32, out: &mut Vec<DiamondId>) {
-        let Tail { mut chunk, mut len } = self.tails[bin as usize];
-        while chunk != NONE {
+        self.drain_some(bin, u32::MAX, out);
+    }
+
+    /// Ids in a bin.
+    pub fn count(&self, bin: u32) -> u32 {
+        self.tails[bin as usize].count
+    }
+
+    /// Takes the last chunks of a bin, `most` ids or a few more, into `out` as [`Self::drain`]
+    /// does; whether the bin is empty then.
+    pub fn drain_some(&mut self, bin: u32, most: u32, out: &mut Vec<DiamondId>) -> bool {
+        let enough = out.len() + most as usize;
+        let Tail { mut chunk, mut len, mut count } = self.tails[bin as usize];
+        while chunk != NONE && out.len() < enough {
             let Chunk { ids, previous, .. } = &self.chunks[chunk as usize];
             out.extend_from_slice(&ids[..len as usize]);
             let previous = *previous;
             self.give_chunk_back(chunk);
-            (chunk, len) = (previous, CHUNK);
+            (chunk, len, count) = (previous, CHUNK, count - len);
         }
-        self.tails[bin as usize] = Tail { chunk: NONE, len: CHUNK };
+        self.tails[bin as usize] = Tail { chunk, len, count };
+        chunk == NONE
     }
 
     /// Loads what removing these diamonds would touch into the cache, all at once.
@@ -128,7 +146,7 @@ impl Bins {
         let tail_of = |id: DiamondId| self.tails[chunk_of(id).bin as usize];
         core::hint::black_box(ids.iter().fold(0, |sum, &id| sum ^ tail_of(id).len));
         for id in &mut *ids {
-            let Tail { chunk, len } = tail_of(*id);
+            let Tail { chunk, len, .. } = tail_of(*id);
             *id = self.chunks[chunk as usize].ids[len as usize - 1];
         }
         diamonds.warm(ids);
@@ -153,7 +171,7 @@ impl Bins {
 
     /// Adds the ids of one bin to a list; they stay.
     pub fn list(&self, bin: u32, out: &mut Vec<DiamondId>) {
-        let Tail { mut chunk, mut len } = self.tails[bin as usize];
+        let Tail { mut chunk, mut len, .. } = self.tails[bin as usize];
         while chunk != NONE {
             let Chunk { ids, previous, .. } = &self.chunks[chunk as usize];
             out.extend_from_slice(&ids[..len as usize]);

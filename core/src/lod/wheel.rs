@@ -12,7 +12,7 @@
 //! slack, never up. A frame reads a handful of odometers and empties the slots that they passed.
 //!
 //! Eyes mostly fly straight. A rule that knows the distance along the course may say how far the
-//! eye can go on it, all paths included that stray from it a little: `forward + 8·aside < length`.
+//! eye can go on it, all paths included that stray from it a little: `forward + 64·aside < length`.
 //! When the course turns by more than half a degree a new one begins; verdicts given on the one
 //! before it count on, and those of the one before that become due.
 
@@ -33,7 +33,7 @@ pub enum Family {
 }
 
 /// What a metre aside of the course counts.
-pub const ASIDE: f64 = 8.0;
+pub const ASIDE: f64 = 64.0;
 
 /// Cosine of half a degree: a course is kept while the eye's steps are this close to it.
 const SAME_COURSE: f64 = 0.999_962;
@@ -92,7 +92,7 @@ const FAMILIES: usize = 5;
 const STRAIGHT: usize = Family::Straight as usize;
 const CLASSES: usize = 64;
 const OCTAVES: usize = 16;
-const SLOT_BITS: u64 = 3;
+const SLOT_BITS: u64 = 4;
 const SLOTS: usize = 1 << SLOT_BITS;
 /// Class 0 has u = 2⁻²⁴ m; the last 2³⁹ m, three times the way to the sun.
 const CLASS_BIAS: i64 = 24;
@@ -149,9 +149,10 @@ impl Wheels {
         }
     }
 
-    /// Direction of the course; zero before the first motion.
-    pub fn course(&self) -> DVec3 {
-        self.courses[self.course].axis
+    /// Direction of the course, zero before the first motion, and how far the eye has gone on it.
+    pub fn course(&self) -> (DVec3, f64) {
+        let Course { axis, forward_m, .. } = self.courses[self.course];
+        (axis, forward_m)
     }
 
     /// Counts a step along both courses, and begins a new one where it leaves this one.
@@ -164,7 +165,7 @@ impl Wheels {
             course.aside_m += aside_m * UP + forward_m * 1e-15;
         }
         let length_m = step_m.length();
-        if length_m > 0.0 && self.course().dot(step_m) < SAME_COURSE * length_m {
+        if length_m > 0.0 && self.course().0.dot(step_m) < SAME_COURSE * length_m {
             self.course = 1 - self.course;
             self.is_new_course = true;
             let axis = step_m / length_m;
@@ -239,7 +240,9 @@ impl Wheels {
     }
 
     /// Calls `empty` with every bin in use that the odometers have passed; they count as empty.
-    pub fn pass(&mut self, mut empty: impl FnMut(u32)) {
+    /// Before a bin is passed, calls `ease` with it and the motions like this one that are left
+    /// until then; `ease` tells whether it emptied the bin.
+    pub fn pass(&mut self, mut empty: impl FnMut(u32), mut ease: impl FnMut(u32, f64) -> bool) {
         let replaced = core::mem::take(&mut self.is_new_course).then_some(STRAIGHT + self.course);
         for at in 0..FAMILIES * CLASSES {
             let reading = self.reading(at / CLASSES, at % CLASSES);
@@ -250,9 +253,17 @@ impl Wheels {
                 let octave = octaves.trailing_zeros() as usize;
                 octaves &= octaves - 1;
                 let wheel = at * OCTAVES + octave;
-                let passed = passed_slots(tick(from, octave), tick(reading, octave));
-                let passed = if all { u32::MAX } else { passed };
+                let now = tick(reading, octave);
+                let passed = if all { u32::MAX } else { passed_slots(tick(from, octave), now) };
                 self.empty_slots(wheel, self.slots[wheel] & passed, &mut empty);
+                let next = wheel * SLOTS + (now as usize + 1) % SLOTS;
+                if self.slots[wheel] >> (next % SLOTS) & 1 == 1 {
+                    let left = ((now + 1) as f64 * width(octave) - reading) / (reading - from);
+                    let next = u32::try_from(next).expect("bins are counted in u32");
+                    if left > 1.0 && ease(next, left) {
+                        self.emptied(next);
+                    }
+                }
             }
         }
     }
@@ -322,6 +333,12 @@ fn tick(reading: f64, octave: usize) -> u64 {
     (reading * per_unit) as u64
 }
 
+/// The width of an octave's ticks.
+#[inline]
+fn width(octave: usize) -> f64 {
+    f64::from_bits((1023 - SLOT_BITS - octave as u64) << 52)
+}
+
 /// The slots of the ticks after `from` up to and with `to`.
 #[inline]
 fn passed_slots(from: u64, to: u64) -> u32 {
@@ -355,7 +372,7 @@ mod tests {
             wheels.leaf_threshold_fell(1.0 + fall, 1.0);
             (path_m, drift) = (path_m + motion.path_m, drift + fall);
             let mut due = Vec::new();
-            wheels.pass(|bin| due.push(bin));
+            wheels.pass(|bin| due.push(bin), |_, _| false);
             pending.retain(|&(bin, lasts, at_m, drifted)| {
                 let used_m = path_m - at_m + lasts.scale_m * (drift - drifted);
                 let is_due = due.contains(&bin);

@@ -5,9 +5,14 @@
 //! Keeps: nothing between tests.
 //! Not here: allocation (`allocation.rs`, which replaces the allocator), times.
 
+mod chaos;
+mod each;
+mod layers;
 mod loops;
 mod order;
 mod panics;
+mod scratch;
+mod soak;
 mod spans;
 mod wakes;
 
