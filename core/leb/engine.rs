@@ -100,11 +100,7 @@ fn comes([distance, reach, ahead]: [f64; 3], course_m: f64) -> Lasts {
 
 /// Along the course or whatever the path, whichever lasts longer. A course is trusted for as long
 /// as it has been held.
-fn longer(
-    family: Family,
-    (slack, length): (f64, f64),
-    (scale_m, course_m): (f64, f64),
-) -> Lasts {
+fn longer(family: Family, (slack, length): (f64, f64), (scale_m, course_m): (f64, f64)) -> Lasts {
     let rounding = 1e-12 * scale_m;
     if length > 1.25 * slack && slack < course_m {
         let length_m = length - rounding;

@@ -12,6 +12,7 @@ use overfly_core::digest::mix;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::settings::SceneSettings;
 use overfly_core::units::Radians;
+use proptest::prelude::*;
 use rig::{Rig, scene, view};
 
 const EARTH: Ellipsoid = Ellipsoid::WGS84;
@@ -63,5 +64,112 @@ fn a_straight_flight_in_the_budget() {
         let [lazy, all] = side_by_side(&settings, 300, views, |_, _| true);
         println!("k = {patch_depth}: {lazy} judged instead of {all}");
         assert!(lazy * 4 < all, "{lazy} of {all}");
+    }
+}
+
+#[test]
+fn a_descent_to_the_tolerance_and_a_climb_back() {
+    let mut settings = scene(4, 400_000);
+    settings.lod.tolerance.0 = 60.0;
+    let views = |frame: u64| {
+        let part = (frame as f64 / 200.0 - 1.0).abs();
+        let height_m = 2_000.0 + 60_000.0 * part * part;
+        vec![view(&EARTH, at(46.8, -121.8 + 1e-4 * frame as f64, height_m), 60.0, -20.0)]
+    };
+    let [lazy, all] = side_by_side(&settings, 400, views, |_, _| true);
+    println!("{lazy} judged instead of {all}");
+    assert!(lazy * 3 < all, "{lazy} of {all}");
+}
+
+#[test]
+fn turns_rolls_jumps_and_zooms_with_late_pages() {
+    for (patch_depth, budget, tolerance_px) in
+        [(0, 12_000, 2.0), (4, 50_000, 2.0), (4, 50_000, 80.0)]
+    {
+        let mut settings = scene(patch_depth, budget);
+        settings.lod.tolerance.0 = tolerance_px;
+        (settings.lod.splits_max, settings.lod.merges_max) = (60, 60);
+        settings.memory.pages_bytes = 4 << 20;
+        let views = |frame: u64| {
+            let (turn, leg) = (frame as f64, frame / 90);
+            let jump = [0.0, 3.0, -20.0, 0.4][leg as usize % 4];
+            let here = at(46.8 + jump, -121.8 + jump + 1e-4 * turn, 2_500.0 + 40.0 * turn);
+            let mut one = view(&EARTH, here, 2.5 * turn, -10.0 - 0.1 * turn);
+            one.field_of_view = Radians::from_degrees(if leg % 2 == 0 {
+                60.0
+            } else {
+                60.0 - 0.4 * (frame % 90) as f64
+            });
+            vec![one]
+        };
+        let lets = |frame: u64, page: usize| mix(frame * 64 + page as u64) & 3 == 0;
+        side_by_side(&settings, 360, views, lets);
+    }
+}
+
+#[test]
+fn several_views_that_come_and_go() {
+    let settings = scene(4, 60_000);
+    let views = |frame: u64| {
+        let here = at(20.0 + 1e-4 * frame as f64, 30.0, 9_000.0);
+        let count = [1, 2, 3, 2][frame as usize / 40 % 4];
+        let one = |i: u64| {
+            let mut one = view(&EARTH, here, 120.0 * i as f64 + 0.2 * frame as f64, -15.0);
+            one.near_m = if frame < 100 { 0.1 } else { 500.0 };
+            one
+        };
+        (0..count).map(one).collect()
+    };
+    side_by_side(&settings, 200, views, |_, _| true);
+}
+
+#[test]
+fn below_the_ground_and_far_out_in_space() {
+    let settings = scene(4, 30_000);
+    let heights_m = [5_000.0, -11_100.0, -200_000.0, -6_300_000.0, 1e7, 1e12, 1e18, -40.0, 3.0];
+    let views = |frame: u64| {
+        let height_m = heights_m[frame as usize / 25 % heights_m.len()];
+        let here = at(12.0, 1e-5 * frame as f64, height_m * (1.0 + 1e-4 * (frame % 25) as f64));
+        vec![view(&EARTH, here, 10.0, -30.0)]
+    };
+    side_by_side(&settings, 225, views, |_, _| true);
+}
+
+#[test]
+fn a_still_eye_is_judged_no_more() {
+    let mut rig = Rig::new(&scene(4, 60_000), 0);
+    let views = [view(&EARTH, at(46.8, -121.8, 3_000.0), 80.0, -8.0)];
+    rig.settle(&views);
+    for _ in 0..3 {
+        rig.frame(&views, |_| true);
+        assert_eq!(rig.output.counts.evaluations, 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_flight_gives_the_same_frames(
+        patch_depth in prop::sample::select(vec![0_u8, 2, 4]),
+        budget in 2_000_u32..30_000,
+        tolerance_px in 1.0..200.0_f64,
+        speed in -7.0..-1.0_f64,
+        legs in prop::collection::vec((-80.0..80.0_f64, -180.0..180.0_f64, 0.5..6.0_f64, -3.0..3.0_f64, 0_u64..u64::MAX), 2..4),
+    ) {
+        let mut settings = scene(patch_depth, budget.max(16 << patch_depth));
+        settings.lod.tolerance.0 = tolerance_px;
+        let step_deg = libm::exp10(speed);
+        let views = |frame: u64| {
+            let (lat, lon, log_height, turn, _) = legs[frame as usize / 40 % legs.len()];
+            let along = (frame % 40) as f64;
+            let here = at(lat, lon + step_deg * along, libm::exp10(log_height) * (1.0 + 0.002 * along));
+            vec![view(&EARTH, here, lon + turn * along, -25.0)]
+        };
+        let lets = |frame: u64, page: usize| {
+            let mask = legs[frame as usize / 40 % legs.len()].4;
+            mask >> ((page as u64 * 7 + frame) % 64) & 1 == 1
+        };
+        side_by_side(&settings, 40 * legs.len() as u64, views, lets);
     }
 }

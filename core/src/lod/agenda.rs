@@ -16,8 +16,8 @@ use super::diamonds::{Diamond, DiamondId, Diamonds, Role, Seat};
 use super::urgent::{Rank, Seating, URGENT_BINS, Urgent};
 use super::wheel::{Lasts, Motion, WHEEL_BINS, Wheels};
 use crate::columns::Column;
-use core::cmp::Ordering;
 use core::cell::RefCell;
+use core::cmp::Ordering;
 use glam::DVec3;
 
 /// What verdicts are given against: the two thresholds, in pixels, and the course.
@@ -65,11 +65,17 @@ pub const WARM: usize = 32;
 /// over many frames and must not all be judged in one.
 fn ease(bins: &mut Bins, bin: u32, motions: f64, due: &mut Vec<DiamondId>) -> bool {
     let share = f64::from(bins.count(bin)) / motions;
-    share >= EASED && bins.drain_some(bin, share as u32, due)
+    share >= f64::from(EASED) && bins.drain_some(bin, EASED.max(whole(share)), due)
+}
+
+fn whole(share: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "it saturates, and a bin is no larger")]
+    let whole = share as u32;
+    whole
 }
 
 /// A share of a bin that is worth to be judged early.
-const EASED: f64 = 64.0;
+const EASED: u32 = 64;
 
 /// Seats, thresholds and odometers.
 pub struct Agenda {

@@ -20,7 +20,7 @@ use crate::mesh::patches::{Leaf, Patches};
 use crate::settings::LodSettings;
 use glam::IVec3;
 
-/// What the planet hangs on each diamond; empty for free records.
+/// What the planet hangs on each diamond; meaningless for free records.
 pub struct Cover {
     /// Bounds of the diamond and all its descendants; read by every verdict.
     pub region: Column<Diamond, Region>,
@@ -100,13 +100,7 @@ impl Rule for Planet<'_> {
             let page = self.page_of_kids(diamonds, id, side).expect("the plan found every page");
             for edge in [2 * side, 2 * side + 1] {
                 let kid = diamonds[id].kids()[edge].expect("a split diamond has all kids");
-                let kid_side = diamonds[kid].side_of(id);
-                self.cover.pages[kid][kid_side] = Some(page);
-                self.pages.hold(page);
-                if !diamonds[kid].has_side(1 - kid_side) {
-                    self.cover.region[kid] = self.region_of(diamonds, kid);
-                }
-                self.add_leaf(diamonds, kid, kid_side);
+                self.cover_side(diamonds, kid, (diamonds[kid].side_of(id), page));
             }
         }
     }
@@ -135,6 +129,16 @@ impl Planet<'_> {
             self.add_leaf(diamonds, id, 0);
             self.add_leaf(diamonds, id, 1);
         }
+    }
+
+    /// A kid has got a side: its page, its leaf triangle, and if it is new its bounds.
+    fn cover_side(&mut self, diamonds: &Diamonds, kid: DiamondId, (side, page): (usize, Id<Page>)) {
+        self.cover.pages[kid][side] = Some(page);
+        self.pages.hold(page);
+        if !diamonds[kid].has_side(1 - side) {
+            self.cover.region[kid] = self.region_of(diamonds, kid);
+        }
+        self.add_leaf(diamonds, kid, side);
     }
 
     fn add_leaf(&mut self, diamonds: &Diamonds, id: DiamondId, side: usize) {

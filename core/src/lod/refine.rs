@@ -160,9 +160,8 @@ impl Mesh {
             let (diamonds, agenda) = (&self.diamonds, &self.agenda);
             spread(placements, &|first, chunk| {
                 diamonds.warm(&ids[first..first + chunk.len()]);
-                for (placement, &id) in chunk.iter_mut().zip(&ids[first..]) {
-                    *placement = agenda.placement(&judge(diamonds, id, band));
-                }
+                let place = |id| agenda.placement(&judge(diamonds, id, band));
+                chunk.iter_mut().zip(&ids[first..]).for_each(|(to, &id)| *to = place(id));
             });
             ids.iter().zip(placements).for_each(|(&id, &mut placement)| self.seat(id, placement));
         }

@@ -208,18 +208,21 @@ impl Urgent {
 
     fn sink(&mut self, seating: &mut Seating<'_>, mut at: usize) {
         loop {
-            let mut first = at;
-            for kid in [2 * at + 1, 2 * at + 2] {
-                if kid < self.front.len() && self.before(seating, kid, first) {
-                    first = kid;
-                }
-            }
+            let first = self.first_of(seating, at);
             if first == at {
                 return;
             }
             self.swap(seating, at, first);
             at = first;
         }
+    }
+
+    /// The first of a place of the heap and both below it.
+    fn first_of(&self, seating: &Seating<'_>, at: usize) -> usize {
+        let (left, right) = (2 * at + 1, 2 * at + 2);
+        let better = |kid, than| kid < self.front.len() && self.before(seating, kid, than);
+        let first = if better(left, at) { left } else { at };
+        if better(right, first) { right } else { first }
     }
 
     fn swap(&mut self, seating: &mut Seating<'_>, a: usize, b: usize) {
@@ -281,35 +284,34 @@ mod tests {
         }
     }
 
+    /// Takes all of a set, seated in some rotation, and compares with a plain sort.
+    fn sorts(wins: Ordering, given: [f64; 4], rotation: usize) {
+        let mut diamonds = Diamonds::new(4);
+        let base = diamonds.create_base();
+        let mut priority_px = Column::new(4, || 0.0);
+        base.iter().zip(given).for_each(|(&id, px)| priority_px[id] = px);
+        let bins = &mut Bins::new(URGENT_BINS, 4);
+        let seating = &mut Seating { diamonds: &mut diamonds, bins, priority_px: &priority_px };
+        let mut expected = base;
+        expected.sort_by(|&a, &b| seating.order(a, b));
+        if wins == Ordering::Greater {
+            expected.reverse();
+        }
+        let mut set = Urgent::new(0, wins, 4);
+        (0..4).for_each(|i| set.push(seating, base[(i + rotation) % 4]));
+        for id in expected {
+            assert_eq!(set.first(seating), Some(id), "{given:?}");
+            set.remove_from_front(seating, id);
+        }
+        assert_eq!(set.first(seating), None);
+    }
+
     #[test]
     fn the_first_is_found_in_any_order_of_insertion_and_removal() {
-        for wins in [Ordering::Greater, Ordering::Less] {
-            let mut diamonds = Diamonds::new(4);
-            let base = diamonds.create_base();
-            let mut priority_px = Column::new(4, || 0.0);
-            let mut bins = Bins::new(URGENT_BINS, 4);
-            for (rotation, given) in [[3.0, 1.0, 1.0, 0.0], [1.0, 1.0001, 1.0002, 9.0]]
-                .into_iter()
-                .flat_map(|given| (0..4).map(move |rotation| (rotation, given)))
-            {
-                let mut set = Urgent::new(0, wins, 4);
-                base.iter().zip(given).for_each(|(&id, px)| priority_px[id] = px);
-                let mut expected = base;
-                let seating = &mut Seating {
-                    diamonds: &mut diamonds,
-                    bins: &mut bins,
-                    priority_px: &priority_px,
-                };
-                expected.sort_by(|&a, &b| match wins {
-                    Ordering::Greater => seating.order(b, a),
-                    _ => seating.order(a, b),
-                });
-                (0..4).for_each(|i| set.push(seating, base[(i + rotation) % 4]));
-                for id in expected {
-                    assert_eq!(set.first(seating), Some(id));
-                    set.remove_from_front(seating, id);
-                }
-                assert_eq!(set.first(seating), None);
+        for given in [[3.0, 1.0, 1.0, 0.0], [1.0, 1.0001, 1.0002, 9.0], [0.0; 4]] {
+            for rotation in 0..4 {
+                sorts(Ordering::Greater, given, rotation);
+                sorts(Ordering::Less, given, rotation);
             }
         }
     }
