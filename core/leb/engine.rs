@@ -16,6 +16,7 @@ use overfly_core::datasource::PageKey;
 use overfly_core::digest::mix;
 use overfly_core::lattice::{RADIUS, unfold};
 use overfly_core::lod::agenda::{Band, Verdict};
+use overfly_core::lod::diamonds::Shape;
 use overfly_core::lod::refine::{ALONE, Knobs, Mesh, Refinement, Rule, Spread};
 use overfly_core::lod::wheel::{ASIDE, Family, Lasts, Motion};
 use overfly_core::lod::{DiamondId, Diamonds};
@@ -182,20 +183,10 @@ impl Engine {
         let (mut tally, mut sum) = (Tally { leaves: 0, deepest: 0 }, 0_u64);
         for id in diamonds.ids().filter(|&id| !diamonds[id].is_split()) {
             let shape = diamonds.shape(id);
-            for side in (0..2).filter(|&side| diamonds[id].has_side(side)) {
-                let triangle = shape.triangle(side);
-                if triangle.iter().any(|corner| corner.x < 0 || corner.y < 0) {
-                    continue;
-                }
-                let depth = u32::from(shape.level) + 1;
+            let sides = (0..2).filter(|&side| diamonds[id].has_side(side));
+            for key in sides.filter_map(|side| key_of(&shape, side)) {
                 tally.leaves += 1;
-                tally.deepest = tally.deepest.max(depth);
-                let (x, y) = triangle.iter().fold((0_u64, 0_u64), |(x, y), &corner| {
-                    let (u, v) = unfold(0, corner);
-                    (x + u64::from(u.unsigned_abs()), y + u64::from(v.unsigned_abs()))
-                });
-                // The lattice is 2³⁰ a side; the digest counts in 2⁻²⁴.
-                let key = u64::from(depth) << 58 ^ x >> 6 << 29 ^ y >> 6;
+                tally.deepest = tally.deepest.max(u32::from(shape.level) + 1);
                 sum = sum.wrapping_add(mix(key));
             }
         }
@@ -208,6 +199,20 @@ impl Engine {
         let records = diamonds.used_end();
         records as usize * 64 + self.mesh.agenda.bytes(records)
     }
+}
+
+/// The workload's key of a triangle; `None` if it is not in the square.
+fn key_of(shape: &Shape, side: usize) -> Option<u64> {
+    let triangle = shape.triangle(side);
+    if triangle.iter().any(|corner| corner.x < 0 || corner.y < 0) {
+        return None;
+    }
+    let unfolded = triangle.map(|corner| unfold(0, corner));
+    let [x, y] = unfolded.iter().fold([0_u64; 2], |[x, y], (u, v)| {
+        [x + u64::from(u.unsigned_abs()), y + u64::from(v.unsigned_abs())]
+    });
+    // The lattice is 2³⁰ a side; the key counts in 2⁻²⁴.
+    Some((u64::from(shape.level) + 1) << 58 ^ x >> 6 << 29 ^ y >> 6)
 }
 
 /// An engine whose verdicts are shared among workers.

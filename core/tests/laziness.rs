@@ -24,9 +24,9 @@ fn at(lat_deg: f64, lon_deg: f64, height_m: f64) -> Geodetic {
 /// Flies both ways side by side and compares every frame. Returns the diamonds judged by each.
 fn side_by_side(
     settings: &SceneSettings,
-    frames: u64,
-    mut views_of: impl FnMut(u64) -> Vec<View>,
-    mut lets: impl FnMut(u64, usize) -> bool,
+    frames: u32,
+    mut views_of: impl FnMut(u32) -> Vec<View>,
+    mut lets: impl FnMut(u32, usize) -> bool,
 ) -> [u64; 2] {
     let mut lazy = Rig::new(settings, 0);
     let mut all = Rig::new(settings, 0);
@@ -57,8 +57,8 @@ fn side_by_side(
 fn a_straight_flight_in_the_budget() {
     for (patch_depth, budget) in [(0, 20_000), (4, 60_000)] {
         let settings = scene(patch_depth, budget);
-        let views = |frame: u64| {
-            let lon = -121.8 + 2e-4 * frame as f64;
+        let views = |frame: u32| {
+            let lon = -121.8 + 2e-4 * f64::from(frame);
             vec![view(&EARTH, at(46.8, lon, 3_000.0), 80.0, -8.0)]
         };
         let [lazy, all] = side_by_side(&settings, 300, views, |_, _| true);
@@ -71,10 +71,10 @@ fn a_straight_flight_in_the_budget() {
 fn a_descent_to_the_tolerance_and_a_climb_back() {
     let mut settings = scene(4, 400_000);
     settings.lod.tolerance.0 = 60.0;
-    let views = |frame: u64| {
-        let part = (frame as f64 / 200.0 - 1.0).abs();
+    let views = |frame: u32| {
+        let part = (f64::from(frame) / 200.0 - 1.0).abs();
         let height_m = 2_000.0 + 60_000.0 * part * part;
-        vec![view(&EARTH, at(46.8, -121.8 + 1e-4 * frame as f64, height_m), 60.0, -20.0)]
+        vec![view(&EARTH, at(46.8, -121.8 + 1e-4 * f64::from(frame), height_m), 60.0, -20.0)]
     };
     let [lazy, all] = side_by_side(&settings, 400, views, |_, _| true);
     println!("{lazy} judged instead of {all}");
@@ -90,19 +90,19 @@ fn turns_rolls_jumps_and_zooms_with_late_pages() {
         settings.lod.tolerance.0 = tolerance_px;
         (settings.lod.splits_max, settings.lod.merges_max) = (60, 60);
         settings.memory.pages_bytes = 4 << 20;
-        let views = |frame: u64| {
-            let (turn, leg) = (frame as f64, frame / 90);
+        let views = |frame: u32| {
+            let (turn, leg) = (f64::from(frame), frame / 90);
             let jump = [0.0, 3.0, -20.0, 0.4][leg as usize % 4];
             let here = at(46.8 + jump, -121.8 + jump + 1e-4 * turn, 2_500.0 + 40.0 * turn);
             let mut one = view(&EARTH, here, 2.5 * turn, -10.0 - 0.1 * turn);
             one.field_of_view = Radians::from_degrees(if leg % 2 == 0 {
                 60.0
             } else {
-                60.0 - 0.4 * (frame % 90) as f64
+                60.0 - 0.4 * f64::from(frame % 90)
             });
             vec![one]
         };
-        let lets = |frame: u64, page: usize| mix(frame * 64 + page as u64) & 3 == 0;
+        let lets = |frame: u32, page: usize| mix(u64::from(frame) * 64 + page as u64) & 3 == 0;
         side_by_side(&settings, 360, views, lets);
     }
 }
@@ -110,11 +110,11 @@ fn turns_rolls_jumps_and_zooms_with_late_pages() {
 #[test]
 fn several_views_that_come_and_go() {
     let settings = scene(4, 60_000);
-    let views = |frame: u64| {
-        let here = at(20.0 + 1e-4 * frame as f64, 30.0, 9_000.0);
+    let views = |frame: u32| {
+        let here = at(20.0 + 1e-4 * f64::from(frame), 30.0, 9_000.0);
         let count = [1, 2, 3, 2][frame as usize / 40 % 4];
-        let one = |i: u64| {
-            let mut one = view(&EARTH, here, 120.0 * i as f64 + 0.2 * frame as f64, -15.0);
+        let one = |i: u32| {
+            let mut one = view(&EARTH, here, 120.0 * f64::from(i) + 0.2 * f64::from(frame), -15.0);
             one.near_m = if frame < 100 { 0.1 } else { 500.0 };
             one
         };
@@ -127,9 +127,10 @@ fn several_views_that_come_and_go() {
 fn below_the_ground_and_far_out_in_space() {
     let settings = scene(4, 30_000);
     let heights_m = [5_000.0, -11_100.0, -200_000.0, -6_300_000.0, 1e7, 1e12, 1e18, -40.0, 3.0];
-    let views = |frame: u64| {
+    let views = |frame: u32| {
         let height_m = heights_m[frame as usize / 25 % heights_m.len()];
-        let here = at(12.0, 1e-5 * frame as f64, height_m * (1.0 + 1e-4 * (frame % 25) as f64));
+        let here =
+            at(12.0, 1e-5 * f64::from(frame), height_m * (1.0 + 1e-4 * f64::from(frame % 25)));
         vec![view(&EARTH, here, 10.0, -30.0)]
     };
     side_by_side(&settings, 225, views, |_, _| true);
@@ -160,16 +161,16 @@ proptest! {
         let mut settings = scene(patch_depth, budget.max(16 << patch_depth));
         settings.lod.tolerance.0 = tolerance_px;
         let step_deg = libm::exp10(speed);
-        let views = |frame: u64| {
+        let views = |frame: u32| {
             let (lat, lon, log_height, turn, _) = legs[frame as usize / 40 % legs.len()];
-            let along = (frame % 40) as f64;
+            let along = f64::from(frame % 40);
             let here = at(lat, lon + step_deg * along, libm::exp10(log_height) * (1.0 + 0.002 * along));
             vec![view(&EARTH, here, lon + turn * along, -25.0)]
         };
-        let lets = |frame: u64, page: usize| {
+        let lets = |frame: u32, page: usize| {
             let mask = legs[frame as usize / 40 % legs.len()].4;
-            mask >> ((page as u64 * 7 + frame) % 64) & 1 == 1
+            mask >> ((page as u64 * 7 + u64::from(frame)) % 64) & 1 == 1
         };
-        side_by_side(&settings, 40 * legs.len() as u64, views, lets);
+        side_by_side(&settings, 40 * u32::try_from(legs.len()).unwrap(), views, lets);
     }
 }
