@@ -28,7 +28,11 @@ const CACHED: u32 = 1 << 17;
 
 /// Share of a threshold by which the thresholds enclose the priority where both sides meet: more
 /// of it means more urgent diamonds, less of it more moves of the thresholds.
-const MARGIN: f64 = 0.01;
+const MARGIN: f64 = 0.001;
+
+/// Share by which a threshold moves beyond what is asked for: what may have been passed is judged
+/// at once, so small moves make small frames. Each further move of a frame is twice as far.
+const STEP: f64 = 0.0005;
 
 /// Where priorities come from and what hangs on diamonds: the planet, or a workload.
 pub trait Rule: Sync {
@@ -97,6 +101,8 @@ pub struct Mesh {
     deepest_px: f64,
     /// Worst leaf that waits.
     waiting_px: f64,
+    /// How far beyond what is asked for a threshold moves next.
+    step: f64,
 }
 
 /// Spreads a pass over a column of placements: `spread(column, body)` calls `body` with the index of
@@ -119,6 +125,7 @@ impl Mesh {
             placements: vec![Placement::Urgent(0.0); BLOCK.min(capacity as usize)],
             deepest_px: 0.0,
             waiting_px: 0.0,
+            step: STEP,
         }
     }
 
@@ -217,6 +224,7 @@ impl Mesh {
     pub fn refine(&mut self, rule: &mut impl Rule) -> Refinement {
         self.lacking.clear();
         self.waiting_px = 0.0;
+        self.step = STEP / 2.0;
         self.judge_late(rule);
         self.merge_needless(rule);
         self.agenda.look_ahead(Role::Leaf, self.knobs.splits_max);
@@ -317,7 +325,8 @@ impl Mesh {
         if leaf_px <= floor_px {
             return false;
         }
-        let to_px = known_px.max(leaf_px * (1.0 - 2.0 * MARGIN)).max(floor_px);
+        self.step = 0.5_f64.min(2.0 * self.step);
+        let to_px = known_px.max(leaf_px * (1.0 - self.step)).max(floor_px);
         self.agenda.lower_leaf_threshold(to_px);
         self.judge_due(&|diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band), ALONE);
         true
@@ -333,7 +342,8 @@ impl Mesh {
         let Band { parent_px, .. } = self.agenda.band();
         if least_px > parent_px && rank.priority_px > parent_px {
             // A certain parent might be the least and worth less.
-            self.agenda.raise_parent_threshold(rank.priority_px * (1.0 + MARGIN));
+            self.step = 0.5_f64.min(2.0 * self.step);
+            self.agenda.raise_parent_threshold(rank.priority_px * (1.0 + self.step));
             self.judge_due(&|diamonds: &Diamonds, id, band| rule.judge(diamonds, id, band), ALONE);
             return true;
         }
