@@ -23,6 +23,10 @@ const BLOCK: usize = 4096;
 /// Where there are few: their records stay in the first cache until they are seated.
 const SMALL_BLOCK: usize = 256;
 
+/// While the counts of operations end a frame and not the budget, leaves below this share of the
+/// greatest priority count as certain.
+const GROWTH: f64 = 0.5;
+
 /// Records of a mesh that is in the second cache anyway.
 const CACHED: u32 = 1 << 17;
 
@@ -372,7 +376,8 @@ impl Mesh {
         let first = self.agenda.first_leaf(&mut self.diamonds);
         let first_px = first.map_or(0.0, |id| self.agenda.priority_px[id]);
         if !full {
-            self.agenda.relax(leaf_px, tolerance_px);
+            // What is far from being split need not be known exactly while the mesh grows.
+            self.agenda.relax(leaf_px.max(GROWTH * first_px), tolerance_px);
             return;
         }
         let meet_px = first_px.max(leaf_px);
