@@ -74,6 +74,32 @@ pub(crate) struct Crew<S: Shim = Std> {
     chaos: Option<Chaos>,
 }
 
+/// A loop whose owner wakes sleepers only once it has seen how long chunks last. Those awake have
+/// come by then: waking for a loop of a few microseconds costs more than the loop.
+pub(crate) struct Call<'c, S: Shim = Std> {
+    crew: &'c Crew<S>,
+    /// When the loop began; `None` when there is nobody to wake any more.
+    begin_ns: Option<u64>,
+}
+
+impl<S: Shim> Call<'_, S> {
+    /// To be called between chunks, while the owner has `done` some and `left` are unclaimed.
+    #[inline]
+    pub(crate) fn progress(&mut self, done: usize, left: usize) {
+        if let Some(begin_ns) = self.begin_ns {
+            self.judge(S::now_ns() - begin_ns, done as u64, left);
+        }
+    }
+
+    /// Wakes sleepers if the chunks left would keep the owner for long. It takes one itself.
+    fn judge(&mut self, took_ns: u64, done: u64, left: usize) {
+        if left > 1 && took_ns.saturating_mul(left as u64) >= S::WORTH_NS * done {
+            self.begin_ns = None;
+            self.crew.wake_any(left - 1);
+        }
+    }
+}
+
 /// Bits of lanes `1..=count`.
 fn first_bits(count: usize) -> u64 {
     if count < 64 { (1 << count) - 1 } else { u64::MAX }
@@ -157,11 +183,36 @@ impl<S: Shim> Crew<S> {
     pub(crate) fn announce(&self, jobs: usize) {
         if jobs > 0 {
             self.raise();
-            let woken = usize::from(self.wake_leader());
-            if jobs > woken {
-                self.wake(u64::MAX, jobs - woken);
+            self.wake_any(jobs);
+        }
+    }
+
+    fn wake_any(&self, jobs: usize) {
+        let woken = usize::from(self.wake_leader());
+        if jobs > woken {
+            self.wake(u64::MAX, jobs - woken);
+        }
+    }
+
+    /// Says that up to `jobs` threads could join a loop of the caller's: those awake come, sleepers
+    /// are left to the [`Call`].
+    pub(crate) fn announce_loop(&self, jobs: usize) -> Call<'_, S> {
+        let mut call = Call { crew: self, begin_ns: None };
+        if jobs > 0 {
+            self.raise();
+            match self.chaos {
+                Some(_) => self.wake_any(jobs),
+                None => call.begin_ns = self.anyone_sleeps().then(S::now_ns),
             }
         }
+        call
+    }
+
+    /// Whether a worker or the caller sleeps.
+    pub(crate) fn anyone_sleeps(&self) -> bool {
+        let asleep = &self.asleep;
+        let workers = asleep.workers.load(Ordering::Acquire);
+        workers | asleep.leader.load(Ordering::Acquire) != 0
     }
 
     /// Says that there is something for the leader.

@@ -115,8 +115,8 @@ impl<C: Sync> Graph<C> {
         StageId(id)
     }
 
-    /// Whether runs write down times; they do at first. Without, a run never reads the clock,
-    /// unless a thread spins for want of work.
+    /// Whether runs write down times; they do at first. Without, a run reads the clock
+    /// only when a thread spins for want of work, or judges a loop while another sleeps.
     pub fn record_spans(&mut self, on: bool) {
         self.records = on;
     }

@@ -69,7 +69,11 @@
 //!   [`WorkerOptions::spin_us`] at a time, and sleep at once when it closes.
 //! - **Panics are results.** A panic ends its stage, skips the stages after it and comes back as
 //!   [`StagePanic`]; the graph and the workers stay usable. So do they after a [`Cancel`].
-//! - **Times cost nothing when off.** Without [`Graph::record_spans`] no stage reads the clock.
+//! - **Nobody is woken for little.** Whoever is awake joins a loop at once; sleepers are woken for
+//!   it when its first chunks show that the others last longer than waking takes. So a chunk must
+//!   not wait for another.
+//! - **Times cost next to nothing when off.** Without [`Graph::record_spans`] the clock is read
+//!   only between the claims of a loop while somebody sleeps.
 //!
 //! # Whose threads
 //!

@@ -113,7 +113,12 @@ pub(crate) struct Plan<S: Shim> {
     /// 1: a predecessor failed or was skipped. Whoever skips the node sets it back. While a node
     /// runs: it failed itself.
     doomed: Box<[S::Word]>,
+    /// How long nodes last; behind those of all nodes, how long each one's followers do.
+    costs: Box<[S::Word]>,
 }
+
+/// What a node lasts that was never timed. Long enough to wake somebody for it.
+const UNTIMED: u64 = u64::MAX;
 
 impl<S: Shim> Plan<S> {
     /// Compiles nodes and edges (before, after); an edge may be there twice.
@@ -142,6 +147,7 @@ impl<S: Shim> Plan<S> {
             tickets: (0..tickets).map(|_| Tickets::new()).collect(),
             left: waits.iter().map(|&waits| S::Word::new(waits)).collect(),
             doomed: waits.iter().map(|_| S::Word::new(0)).collect(),
+            costs: (0..waits.len() * 2).map(|_| S::Word::new(UNTIMED)).collect(),
             waits: waits.into(),
         }
     }
@@ -177,6 +183,29 @@ impl<S: Shim> Plan<S> {
     /// Marks the node as one to be skipped, or as failed.
     pub(crate) fn doom(&self, node: u32) {
         self.doomed[node as usize].store(1, Ordering::Relaxed);
+    }
+
+    /// How long a job lasts, as far as is known: of `Followers`, each of them.
+    pub(crate) fn cost_ns(&self, job: Job) -> u64 {
+        self.cost(job).load(Ordering::Relaxed)
+    }
+
+    /// Remembers how long a job lasted: the longest of late, so that one short run proves little.
+    pub(crate) fn learn(&self, job: Job, took_ns: u64) {
+        let cost = self.cost(job);
+        let kept = match cost.load(Ordering::Relaxed) {
+            UNTIMED => 0,
+            old_ns => old_ns - old_ns / 4,
+        };
+        // Not one exchange: a measurement may get lost.
+        cost.store(took_ns.max(kept), Ordering::Relaxed);
+    }
+
+    fn cost(&self, job: Job) -> &S::Word {
+        match job {
+            Job::Followers(node) => &self.costs[self.nodes.len() + node as usize],
+            Job::Begin(node) | Job::Chunks(node) | Job::Pinned(node) => &self.costs[node as usize],
+        }
     }
 
     /// Takes the mark off; `true` if there was one.

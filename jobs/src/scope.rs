@@ -130,6 +130,9 @@ impl<S: Shim> Drop for Claim<'_, S> {
     }
 }
 
+/// Told, between batches, how many numbers this thread has done and how many are left to take.
+pub(crate) type Progress<'a> = &'a mut dyn FnMut(usize, usize);
+
 /// Hands out the numbers `0..count`, each once, to any number of threads.
 pub(crate) struct Cursor {
     next: CachePadded<AtomicUsize>,
@@ -151,18 +154,21 @@ impl Cursor {
         self.shares
     }
 
-    /// Calls `body` with the numbers that other threads leave; `false` if there were none.
-    pub(crate) fn drain(&self, mut body: impl FnMut(usize)) -> bool {
-        let mut worked = false;
+    /// Calls `body` with the numbers that other threads leave; `false` if there were none. Between
+    /// batches of them calls `progress` with how many it has done and how many are left to take.
+    pub(crate) fn drain(&self, progress: Progress<'_>, mut body: impl FnMut(usize)) -> bool {
+        let mut done = 0;
         while let Some(range) = self.take() {
-            worked = true;
+            let left = self.count - range.end;
+            done += range.len();
             if self.backwards {
                 range.for_each(|number| body(self.count - 1 - number));
             } else {
                 range.for_each(&mut body);
             }
+            progress(done, left);
         }
-        worked
+        done > 0
     }
 
     /// Ends the handing out: what is left will never be handed out.
@@ -171,7 +177,8 @@ impl Cursor {
     }
 
     /// The next numbers: a quarter of a fair share of the rest, so that few exchanges are
-    /// contended at the start and the last batches are short.
+    /// contended at the start and the last batches are short. The first one comes alone: it shows
+    /// how long they last.
     fn take(&self) -> Option<Range<usize>> {
         let mut first = self.next.load(Ordering::Relaxed);
         loop {
@@ -179,7 +186,7 @@ impl Cursor {
                 return None;
             }
             let part = (self.count - first) / (4 * self.shares);
-            let batch = if self.backwards { 1 } else { part.max(1) };
+            let batch = if self.backwards || first == 0 { 1 } else { part.max(1) };
             // Relaxed: the numbers carry no data; the slot orders what the bodies write.
             match self.next.compare_exchange_weak(
                 first,
@@ -223,8 +230,12 @@ impl<'a, A: Send, B: Send> Chunks<'a, A, B> {
 
     /// Calls `body` with the first index and the elements of the chunks that other threads leave;
     /// `false` if there were none.
-    pub(crate) fn drain(&self, body: impl Fn(usize, &mut [A], &mut [B])) -> bool {
-        self.cursor.drain(|chunk| {
+    pub(crate) fn drain(
+        &self,
+        progress: Progress<'_>,
+        body: impl Fn(usize, &mut [A], &mut [B]),
+    ) -> bool {
+        self.cursor.drain(progress, |chunk| {
             let first = chunk * self.grain;
             // SAFETY: the cursor is this value's own, counts once to its end and never back, so
             // each `chunk` comes up in one call only, and chunks of different numbers do not

@@ -19,6 +19,13 @@ pub(crate) trait Shim: Sized + 'static {
     /// How a thread sleeps.
     type Bell: Bell;
 
+    /// What there is to do must last that long to be worth waking somebody: a wake-up takes 50 to
+    /// 90 µs, and the system may put whoever wakes on the core of the waker.
+    const WORTH_NS: u64;
+
+    /// A clock that only compares; model checkers have one that stands still.
+    fn now_ns() -> u64;
+
     /// Spins until `done`, for at most `budget_ns`; what `done` said last.
     fn spin_until(budget_ns: u64, done: impl Fn() -> bool) -> bool;
 }
@@ -134,6 +141,11 @@ macro_rules! shim {
                 type Word = AtomicU64;
                 type Pointer = AtomicPtr<()>;
                 type Bell = (Mutex<bool>, Condvar);
+                const WORTH_NS: u64 = $shim::WORTH_WAKING_NS;
+
+                fn now_ns() -> u64 {
+                    $shim::clock_ns()
+                }
 
                 fn spin_until(budget_ns: u64, done: impl Fn() -> bool) -> bool {
                     $shim::spin(budget_ns, done)
@@ -154,6 +166,12 @@ shim!(Std, std);
 const POLLS: u32 = 32;
 
 impl Std {
+    const WORTH_WAKING_NS: u64 = 30_000;
+
+    fn clock_ns() -> u64 {
+        now_ns()
+    }
+
     /// Pauses and polls; looks at the clock now and then. Never yields: a yield under a busy host
     /// thread gives away a whole slice of the scheduler, and parking does that better.
     fn spin(budget_ns: u64, done: impl Fn() -> bool) -> bool {

@@ -8,7 +8,7 @@
 use crate::crew::Crew;
 use crate::log::Log;
 use crate::run::lane_number;
-use crate::scope::{Chunks, Cursor};
+use crate::scope::{Chunks, Cursor, Progress};
 use crate::scratch::{Blocks, Scratch};
 use crate::spans::{Span, SpanRecord, now_ns};
 use parking_lot::Mutex;
@@ -75,7 +75,9 @@ impl Team<'_> {
         assert!(grain > 0, "a chunk holds at least one element");
         let none: &mut [()] = &mut [];
         let chunks = Chunks::new(items, none, grain, |count| self.cursor(count));
-        self.spread(chunks.cursor(), &|| chunks.drain(|first, items, _| body(first, items)));
+        self.spread(chunks.cursor(), &|progress| {
+            chunks.drain(progress, |first, items, _| body(first, items))
+        });
     }
 
     /// Like [`Team::for_each_chunk`] over two slices of one length, cut at the same indices.
@@ -92,7 +94,7 @@ impl Team<'_> {
         assert!(grain > 0, "a chunk holds at least one element");
         assert_eq!(a.len(), b.len(), "both slices have one length");
         let chunks = Chunks::new(a, b, grain, |count| self.cursor(count));
-        self.spread(chunks.cursor(), &|| chunks.drain(&body));
+        self.spread(chunks.cursor(), &|progress| chunks.drain(progress, &body));
     }
 
     /// Calls `body` for each index below `count`; an index is a chunk.
@@ -101,7 +103,7 @@ impl Team<'_> {
     /// With the panic of a body.
     pub fn for_each_index(&self, count: usize, body: impl Fn(usize) + Sync) {
         let cursor = self.cursor(count);
-        self.spread(&cursor, &|| cursor.drain(&body));
+        self.spread(&cursor, &|progress| cursor.drain(progress, &body));
     }
 
     /// Lends the memory of the worker that runs the stage to `body`. Inside itself it is empty.
@@ -128,15 +130,15 @@ impl Team<'_> {
 
     /// Runs `drain` here and on whoever takes a ticket. There are as many tickets, this thread's
     /// included, as there are threads or chunks, whichever is less.
-    fn spread(&self, cursor: &Cursor, drain: &(dyn Fn() -> bool + Sync)) {
+    fn spread(&self, cursor: &Cursor, drain: &(dyn Fn(Progress<'_>) -> bool + Sync)) {
         let Some(site) = &self.site else {
-            drain();
+            drain(&mut |_, _| ());
             return;
         };
         let fault = Mutex::new(None);
-        let ticket = |worker: u16| {
+        let ticket = |worker: u16, progress: Progress<'_>| {
             let begin_ns = if site.desk.log.is_some() { now_ns() } else { 0 };
-            match catch_unwind(AssertUnwindSafe(drain)) {
+            match catch_unwind(AssertUnwindSafe(|| drain(progress))) {
                 Ok(false) => return,
                 Ok(true) => {}
                 Err(payload) => {
@@ -150,19 +152,19 @@ impl Team<'_> {
             }
         };
         match site.desk.crew.map(|crew| (crew, crew.claim_loop(site.lane.into()))) {
-            None => ticket(site.lane),
+            None => ticket(site.lane, &mut |_, _| ()),
             Some((crew, Some(claim))) => {
                 let helpers = cursor.shares() - 1;
-                let job = |lane| ticket(lane_number(lane));
+                let job = |lane| ticket(lane_number(lane), &mut |_, _| ());
                 claim.open(&job, u32::from(lane_number(helpers)), || {
-                    crew.announce(helpers);
-                    ticket(site.lane);
+                    let mut call = crew.announce_loop(helpers);
+                    ticket(site.lane, &mut |done, left| call.progress(done, left));
                 });
             }
             // This is a loop inside a chunk: its time is part of the outer ticket's, whose worker
             // it cannot know.
             Some((_, None)) => {
-                drain();
+                drain(&mut |_, _| ());
             }
         }
         if let Some(payload) = fault.into_inner() {

@@ -43,6 +43,18 @@ pub(crate) struct Batch {
     word: u64,
 }
 
+impl Batch {
+    /// How many items were unclaimed after this claim.
+    pub(crate) fn left(&self) -> usize {
+        count_in(self.word) - self.items.end
+    }
+}
+
+/// How many items there are.
+fn count_in(word: u64) -> usize {
+    usize::try_from(word >> COUNT_BIT & FIELD).expect("28 bits fit")
+}
+
 /// The word: how many are inside (8 bits), how many items there are (28), the next one (28).
 ///
 /// All in one word, so that entering includes the first claim, nobody can be inside without having
@@ -76,8 +88,7 @@ impl<S: Shim> Tickets<S> {
 
     /// Number of items of this opening.
     pub(crate) fn count(&self) -> usize {
-        let word = self.word.load(Ordering::Relaxed);
-        usize::try_from(word >> COUNT_BIT & FIELD).expect("28 bits fit")
+        count_in(self.word.load(Ordering::Relaxed))
     }
 
     /// Takes part, with a first claim; `None` if nothing is left.

@@ -6,7 +6,7 @@
 //! Not here: closures, panics and times (`run`), sleeping and waking (`crew`).
 
 use crate::chaos::Chaos;
-use crate::crew::Crew;
+use crate::crew::{Call, Crew};
 use crate::plan::{Job, Kind, NONE, Node, Plan};
 use crate::sync::{Shim, Word};
 use crate::tickets::{Batch, ITEMS_MAX, Share};
@@ -75,6 +75,8 @@ pub(crate) struct Walk<'a, W, S: Shim> {
     /// 1 when a node failed or was skipped.
     trouble: S::Word,
     is_chaotic: bool,
+    /// Somebody slept when the run began: what stages last is measured, to know whether to wake.
+    learns: bool,
 }
 
 impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
@@ -82,7 +84,8 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         plan.ready.arm();
         let is_chaotic = crew.is_some_and(|crew| crew.chaos().is_some());
         let (done, trouble) = (S::Word::new(0), S::Word::new(0));
-        Walk { plan, work, crew, done, trouble, is_chaotic }
+        let learns = crew.is_some_and(Crew::anyone_sleeps);
+        Walk { plan, work, crew, done, trouble, is_chaotic, learns }
     }
 
     /// Starts the run and works as the caller until all is done.
@@ -192,7 +195,7 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
     fn perform(&self, taken: Taken, hand: &mut Hand) {
         match (taken.job, taken.batch) {
             (Job::Chunks(_), Some((node, batch))) => {
-                let next = self.share_chunks(node, batch, hand);
+                let next = self.share_chunks(node, batch, None, hand);
                 self.go_on(next, hand);
             }
             (_, Some((node, batch))) => self.share_followers(node, batch, hand),
@@ -221,15 +224,41 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
             return self.finish(node, false, hand);
         }
         match kind {
-            Kind::Each => self.begin_chunks(node, hand),
+            Kind::Each => self.timed(Job::Begin(node), 1, || self.begin_chunks(node, hand)),
             Kind::Pinned if hand.lane != 0 => {
                 self.offer(node);
                 None
             }
             _ => {
-                let (last, passed) = self.work.stages(node, hand, |node| self.heir(node));
+                let stages = || self.work.stages(node, hand, |node| self.heir(node));
+                let (last, passed) = self.timed(Job::Begin(node), 1, stages);
                 self.finish(last, passed, hand)
             }
+        }
+    }
+
+    /// Does `times` jobs of that kind, and remembers what one lasts if that is wanted.
+    #[inline]
+    fn timed<R>(&self, job: Job, times: usize, act: impl FnOnce() -> R) -> R {
+        if !self.learns {
+            return act();
+        }
+        let begin_ns = S::now_ns();
+        let result = act();
+        self.plan.learn(job, (S::now_ns() - begin_ns).div_ceil(times as u64));
+        result
+    }
+
+    /// Tells the others of `offered` jobs. Sleepers are woken if these, and `next` that this worker
+    /// goes on with, last a third of what a loop must: stages bring others after them.
+    fn announce(&self, offered: usize, offered_ns: u64, next: Option<u32>) {
+        let Some(crew) = self.crew.filter(|_| offered > 0) else { return };
+        let next_ns = next.map_or(0, |node| self.plan.cost_ns(Job::Begin(node)));
+        let is_long = next_ns.saturating_add(offered_ns) >= S::WORTH_NS / 3;
+        if is_long || self.chaos().is_some() {
+            crew.announce(offered);
+        } else {
+            crew.call_leader();
         }
     }
 
@@ -248,14 +277,15 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         }
     }
 
-    /// Puts a ready node where others find it.
-    fn offer(&self, node: u32) {
+    /// Puts a ready node where others find it; how long it lasts.
+    fn offer(&self, node: u32) -> u64 {
         let pinned = self.plan.nodes[node as usize].kind == Kind::Pinned;
         let job = if pinned { Job::Pinned(node) } else { Job::Begin(node) };
         self.plan.ready.add(job.number());
         if let Some(crew) = self.crew.filter(|_| pinned) {
             crew.call_leader();
         }
+        self.plan.cost_ns(job)
     }
 
     /// The stage that can follow `node` without a look at anything shared.
@@ -276,11 +306,11 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         }
         let mut next = (at.lone < at.joint).then(|| plan.successor(at.lone));
         let mut offered = at.follower_count();
-        match offered {
-            0 => {}
+        let mut offered_ns = match offered {
+            0 => 0,
             1 => self.offer(plan.successor(at.lone + 1)),
             _ => self.offer_followers(node, offered),
-        }
+        };
         for index in at.joint..at.end {
             let after = plan.successor(index);
             if !plan.release(after, 1) {
@@ -291,7 +321,7 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
                 hand.clock_ns = 0;
                 next = Some(after);
             } else {
-                self.offer(after);
+                offered_ns = offered_ns.saturating_add(self.offer(after));
                 offered += 1;
             }
         }
@@ -303,16 +333,16 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
             self.offer(node);
             (next, offered) = (None, offered + 1);
         }
-        if let Some(crew) = self.crew {
-            crew.announce(offered);
-        }
+        self.announce(offered, offered_ns, next);
         next
     }
 
-    fn offer_followers(&self, node: u32, count: usize) {
+    /// Puts the followers where others find them; how long they last, one after the other.
+    fn offer_followers(&self, node: u32, count: usize) -> u64 {
         let tickets = self.plan.nodes[node as usize].followers;
         self.plan.tickets[tickets as usize].offer(count);
         self.plan.ready.add(Job::Followers(node).number());
+        self.plan.cost_ns(Job::Followers(node)).saturating_mul(count as u64)
     }
 
     /// Counts what is owed; a node that became ready is returned.
@@ -330,11 +360,10 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         let mut next = Some(batch);
         while let Some(batch) = next {
             let items = batch.items.clone();
-            if at.fan {
-                self.run_leaves(&at, items, &mut owed, hand);
-            } else {
-                items.for_each(|item| self.go_on(Some(self.follower(&at, item)), hand));
-            }
+            self.timed(Job::Followers(node), items.len(), || match at.fan {
+                true => self.run_leaves(&at, items, &mut owed, hand),
+                false => items.for_each(|item| self.go_on(Some(self.follower(&at, item)), hand)),
+            });
             next = tickets.claim(&batch, share);
             if let Some(batch) = &next {
                 self.retire_followers(node, batch);
@@ -387,8 +416,8 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         if owed.as_ref().is_some_and(|owed| owed.node != tail)
             && let Some(ready) = self.pay(owed)
         {
-            self.offer(ready);
-            self.crew.inspect(|crew| crew.announce(1));
+            let ready_ns = self.offer(ready);
+            self.announce(1, ready_ns, None);
         }
     }
 
@@ -406,25 +435,38 @@ impl<'a, W: Work, S: Shim> Walk<'a, W, S> {
         }
         let count = count.unwrap_or(0);
         let tickets = self.plan.nodes[node as usize].chunks;
-        let batch = self.plan.tickets[tickets as usize].open(count, self.chunk_share());
-        if let Some(crew) = self.crew.filter(|_| !batch.last) {
-            self.plan.ready.add(Job::Chunks(node).number());
-            crew.announce(count - 1);
+        let mut share = self.chunk_share();
+        if self.crew.is_some_and(Crew::anyone_sleeps) {
+            // The first chunk shows whether to wake them.
+            share.most = 1;
         }
-        self.share_chunks(node, batch, hand)
+        let batch = self.plan.tickets[tickets as usize].open(count, share);
+        let call = self.crew.filter(|_| !batch.last).map(|crew| {
+            self.plan.ready.add(Job::Chunks(node).number());
+            crew.announce_loop(count - 1)
+        });
+        self.share_chunks(node, batch, call, hand)
     }
 
     /// Runs chunks of `node` as long as there are any, `batch` first; whoever leaves last finishes
-    /// the node and gets what that made ready.
-    fn share_chunks(&self, node: u32, batch: Batch, hand: &mut Hand) -> Option<u32> {
+    /// the node and gets what that made ready. Who opened the node has a `call`.
+    fn share_chunks(
+        &self,
+        node: u32,
+        batch: Batch,
+        mut call: Option<Call<'_, S>>,
+        hand: &mut Hand,
+    ) -> Option<u32> {
         let tickets = &self.plan.tickets[self.plan.nodes[node as usize].chunks as usize];
         let (share, chaos, lane) = (self.chunk_share(), self.chaos(), hand.lane);
-        let (mut first, mut own) = (true, batch);
+        let (mut done, mut own) = (0, batch);
         let mut claim = || {
-            if !std::mem::take(&mut first) {
+            if done > 0 {
                 own = tickets.claim(&own, share)?;
+                call.iter_mut().for_each(|call| call.progress(done, own.left() + 1));
             }
             let items = own.items.clone();
+            done += items.len();
             Some(chaos.map_or(items.clone(), |chaos| {
                 chaos.pause(lane);
                 let count = tickets.count();

@@ -8,7 +8,7 @@
 use crate::chaos::Chaos;
 use crate::crew::{Crew, CrewSize, LANES_MAX};
 use crate::frame::{Engaged, Frame};
-use crate::pin::pin_this_thread;
+use crate::pin::{count_elsewhere, pin_this_thread};
 use parking_lot::Mutex;
 use std::error::Error;
 use std::fmt;
@@ -174,11 +174,15 @@ impl Workers {
 
     fn unstarted(options: &WorkerOptions, host: Option<Host>) -> Workers {
         let lanes = options.count + options.seats + 1;
+        // The caller's cores, which threads without one of their own inherit, and those it is kept
+        // off but a worker is bound to.
+        let own = available_parallelism().map_or(1, |cores| cores.get());
+        let pins = &options.pin_to_cores[..options.pin_to_cores.len().min(options.count)];
         let size = CrewSize {
             own: options.count,
             seats: options.seats,
             spin_ns: u64::from(options.spin_us) * 1000,
-            spinners: available_parallelism().map_or(1, |cores| cores.get()),
+            spinners: own + count_elsewhere(pins),
         };
         let chaos = options.chaos.map(|seed| Chaos::new(seed, lanes));
         Workers { crew: Arc::new(Crew::new(&size, chaos)), threads: Vec::new(), host }

@@ -128,10 +128,10 @@ impl Agenda {
 
     /// Where every urgent diamond will be split or merged: lists the first of one role, so that
     /// [`Self::warm_next`] can load what they touch.
-    pub fn look_ahead(&mut self, role: Role, most: u32) {
+    pub fn look_ahead(&mut self, diamonds: &Diamonds, role: Role, most: u32) {
         let set = if role == Role::Leaf { &self.leaves } else { &self.parents };
         self.ahead.clear();
-        set.list_first(&self.bins, most as usize, &mut self.ahead);
+        set.list_first((diamonds, &self.bins), most as usize, &mut self.ahead);
         self.ahead.reverse();
     }
 
@@ -291,11 +291,8 @@ impl Agenda {
     pub fn unseat(&mut self, diamonds: &mut Diamonds, id: DiamondId) {
         match diamonds[id].seat {
             Seat::Free | Seat::None => {}
-            Seat::Front => {
-                let is_leaf = diamonds[id].role() == Role::Leaf;
-                let set = if is_leaf { &mut self.leaves } else { &mut self.parents };
-                set.remove_from_front(seating!(self, diamonds), id);
-            }
+            // Its entry in the heap is stale from here on.
+            Seat::Front => diamonds[id].seat = Seat::None,
             Seat::Bin => {
                 let bin = self.bins.remove(diamonds, id);
                 if self.bins.is_empty(bin) {
@@ -353,7 +350,9 @@ impl Agenda {
         let mut seated = vec![false; diamonds.used_end() as usize];
         let mut all = self.certain();
         [SOON, WAITING].into_iter().for_each(|bin| self.bins.list(bin, &mut all));
-        [&self.leaves, &self.parents].into_iter().for_each(|set| set.list(&self.bins, &mut all));
+        [&self.leaves, &self.parents]
+            .into_iter()
+            .for_each(|set| set.list((diamonds, &self.bins), &mut all));
         for id in all {
             let record = &diamonds[id];
             let there = match record.seat {

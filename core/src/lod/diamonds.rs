@@ -73,7 +73,7 @@ pub enum Seat {
     None,
     /// In a bin; `place` says where.
     Bin,
-    /// In a front heap; `place` is its index.
+    /// In a front heap; `place` is the stamp of its entry.
     Front,
 }
 

@@ -231,7 +231,7 @@ impl Mesh {
         self.step = STEP / 2.0;
         self.judge_late(rule);
         self.merge_needless(rule);
-        self.agenda.look_ahead(Role::Leaf, self.knobs.splits_max);
+        self.agenda.look_ahead(&self.diamonds, Role::Leaf, self.knobs.splits_max);
         while self.done.splits < self.knobs.splits_max {
             self.warm_every(self.done.splits);
             if !self.split_first(rule) {
@@ -259,7 +259,7 @@ impl Mesh {
 
     /// Merges what the tolerance does not ask for: one exact threshold, no hysteresis.
     fn merge_needless(&mut self, rule: &mut impl Rule) {
-        self.agenda.look_ahead(Role::Parent, self.knobs.merges_max);
+        self.agenda.look_ahead(&self.diamonds, Role::Parent, self.knobs.merges_max);
         while self.done.merges < self.knobs.merges_max {
             let Some(id) = self.agenda.first_parent(&mut self.diamonds) else { break };
             if self.agenda.priority_px[id] > self.knobs.tolerance_px {

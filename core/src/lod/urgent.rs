@@ -6,20 +6,22 @@
 //! Not here: those whose side is certain (`wheel`).
 //!
 //! Bins divide priorities around a threshold, where most of them are: 1/4096 octave within 1/4
-//! octave of it, 1/16 octave beyond. An f64's bits grow almost like its logarithm, so finding a bin
+//! octave of it, 1/64 octave beyond. An f64's bits grow almost like its logarithm, so finding a bin
 //! needs none. Only the foremost bin is sorted, as a heap; ties go by level and key.
 
 use super::bins::Bins;
 use super::diamonds::{Diamond, DiamondId, Diamonds, Seat};
-use crate::columns::Column;
+use crate::columns::{Column, Id};
 use core::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// Bins of one such set.
-pub const URGENT_BINS: u32 = 64 * 64;
+pub const URGENT_BINS: u32 = 8192;
+const WORDS: usize = URGENT_BINS as usize / 64;
 
-/// Bits of an f64 that make 1/4096 octave, 1/16 octave and 1/4 octave.
+/// Bits of an f64 that make 1/4096 octave, 1/64 octave and 1/4 octave.
 const FINE: u32 = 52 - 12;
-const COARSE: u32 = 52 - 4;
+const COARSE: u32 = 52 - 6;
 const QUARTER: i64 = 1 << 50;
 
 /// A diamond's standing among others.
@@ -49,13 +51,13 @@ impl Rank {
 fn bucket_of(priority_px: f64, threshold_px: f64) -> u32 {
     let over = priority_px.to_bits().cast_signed() - threshold_px.to_bits().cast_signed();
     let step = if over >= QUARTER {
-        1024 + ((over - QUARTER) >> COARSE).min(1023)
+        1024 + ((over - QUARTER) >> COARSE).min(3071)
     } else if over >= -QUARTER {
         over >> FINE
     } else {
-        -1024 + ((over + QUARTER) >> COARSE).max(-1024)
+        -1024 + ((over + QUARTER) >> COARSE).max(-3072)
     };
-    u32::try_from(step + 2048).expect("clamped to the bins")
+    u32::try_from(step + 4096).expect("clamped to the bins")
 }
 
 /// What the set works on besides itself.
@@ -75,10 +77,36 @@ impl Seating<'_> {
         let priority_px = self.priority_px[id];
         Rank { priority_px, level: record.level(), key: record.key() }
     }
+}
 
-    fn order(&self, a: DiamondId, b: DiamondId) -> Ordering {
-        let exact = self.priority_px[a].total_cmp(&self.priority_px[b]);
-        exact.then_with(|| self.rank(a).order(&self.rank(b)))
+/// An entry of the heap: whose place is taken by the greatest. Derived from [`Rank`], so that
+/// comparing needs no look at the diamond.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry {
+    priority: u64,
+    level: u8,
+    key: u64,
+    /// The diamond's `place` while this entry is its seat; another's is stale.
+    stamp: u32,
+    index: u32,
+}
+
+impl Entry {
+    fn new(rank: Rank, wins: Ordering, (stamp, id): (u32, DiamondId)) -> Self {
+        // Priorities are not negative, so their bits are in their order.
+        let (priority, index) = (rank.priority_px.to_bits(), id.index());
+        if wins == Ordering::Greater {
+            Self { priority, level: !rank.level, key: !rank.key, stamp, index }
+        } else {
+            Self { priority: !priority, level: rank.level, key: rank.key, stamp, index }
+        }
+    }
+
+    /// The diamond, if this is still its seat.
+    fn seated(&self, diamonds: &Diamonds) -> Option<DiamondId> {
+        let id = Id::new(self.index);
+        let record = &diamonds[id];
+        (record.seat == Seat::Front && record.place == self.stamp).then_some(id)
     }
 }
 
@@ -88,10 +116,13 @@ pub struct Urgent {
     first_bin: u32,
     /// What the first of the set is: the greatest of leaves, the least of parents.
     wins: Ordering,
-    occupied: [u64; 64],
-    /// Heap of all that are in `front_bin` or beyond it.
-    front: Vec<DiamondId>,
+    occupied: [u64; WORDS],
+    /// Heap of all that are in `front_bin` or beyond it, and of stale entries.
+    front: BinaryHeap<Entry>,
     front_bin: u32,
+    /// The foremost bin on its way into the heap.
+    drained: Vec<DiamondId>,
+    stamp: u32,
     /// Where the bins are finest; changes only while the set is empty.
     threshold_px: f64,
 }
@@ -102,9 +133,11 @@ impl Urgent {
         Self {
             first_bin,
             wins,
-            occupied: [0; 64],
-            front: Vec::with_capacity(capacity as usize),
+            occupied: [0; WORDS],
+            front: BinaryHeap::with_capacity(capacity as usize),
             front_bin: URGENT_BINS,
+            drained: Vec::with_capacity(capacity as usize),
+            stamp: 0,
             threshold_px: 1.0,
         }
     }
@@ -119,26 +152,18 @@ impl Urgent {
     pub fn push(&mut self, seating: &mut Seating<'_>, id: DiamondId) {
         let step = self.step_of(seating.priority_px[id]);
         if step >= self.front_bin {
-            self.front.push(id);
-            seating.diamonds[id].seat = Seat::Front;
-            self.rise(seating, self.front.len() - 1);
+            self.push_front(seating, id);
         } else {
             seating.bins.push(seating.diamonds, self.first_bin + step, id);
             self.occupied[step as usize / 64] |= 1 << (step % 64);
         }
     }
 
-    /// Takes a diamond out of the front heap.
-    pub fn remove_from_front(&mut self, seating: &mut Seating<'_>, id: DiamondId) {
-        let at = seating.diamonds[id].place as usize;
-        debug_assert_eq!(self.front[at], id);
-        seating.diamonds[id].seat = Seat::None;
-        self.front.swap_remove(at);
-        if at < self.front.len() {
-            seating.diamonds[self.front[at]].place = index(at);
-            self.rise(seating, at);
-            self.sink(seating, at);
-        }
+    fn push_front(&mut self, seating: &mut Seating<'_>, id: DiamondId) {
+        self.stamp = self.stamp.wrapping_add(1);
+        let record = &mut seating.diamonds[id];
+        (record.seat, record.place) = (Seat::Front, self.stamp);
+        self.front.push(Entry::new(seating.rank(id), self.wins, (self.stamp, id)));
     }
 
     /// Notes that one of the set's bins has become empty.
@@ -154,21 +179,23 @@ impl Urgent {
 
     /// The first of the set.
     pub fn first(&mut self, seating: &mut Seating<'_>) -> Option<DiamondId> {
-        if self.front.is_empty() {
+        loop {
+            let is_stale = |entry: &Entry| entry.seated(seating.diamonds).is_none();
+            while self.front.peek().is_some_and(is_stale) {
+                self.front.pop();
+            }
+            if let Some(entry) = self.front.peek() {
+                return Some(Id::new(entry.index));
+            }
             let word = self.occupied.iter().rposition(|&word| word != 0)?;
             let step = index(word) * 64 + 63 - self.occupied[word].leading_zeros();
-            seating.bins.drain(self.first_bin + step, &mut self.front);
+            let mut drained = core::mem::take(&mut self.drained);
+            seating.bins.drain(self.first_bin + step, &mut drained);
             self.emptied(self.first_bin + step);
             self.front_bin = step;
-            for at in 0..self.front.len() {
-                let record = &mut seating.diamonds[self.front[at]];
-                (record.seat, record.place) = (Seat::Front, index(at));
-            }
-            for at in (0..self.front.len() / 2).rev() {
-                self.sink(seating, at);
-            }
+            drained.drain(..).for_each(|id| self.push_front(seating, id));
+            self.drained = drained;
         }
-        self.front.first().copied()
     }
 
     /// Empties the set into `out`; the diamonds are nowhere then. From here on bins are finest
@@ -180,12 +207,13 @@ impl Urgent {
         out: &mut Vec<DiamondId>,
     ) {
         self.threshold_px = threshold_px;
-        for &id in &self.front {
+        for entry in self.front.drain() {
+            let Some(id) = entry.seated(seating.diamonds) else { continue };
             seating.diamonds[id].seat = Seat::None;
+            out.push(id);
         }
-        out.append(&mut self.front);
         self.front_bin = URGENT_BINS;
-        for word in 0..64_u32 {
+        for word in 0..index(WORDS) {
             while self.occupied[word as usize] != 0 {
                 let step = word * 64 + self.occupied[word as usize].trailing_zeros();
                 seating.bins.drain(self.first_bin + step, out);
@@ -194,47 +222,15 @@ impl Urgent {
         }
     }
 
-    fn before(&self, seating: &Seating<'_>, a: usize, b: usize) -> bool {
-        seating.order(self.front[a], self.front[b]) == self.wins
-    }
-
-    fn rise(&mut self, seating: &mut Seating<'_>, mut at: usize) {
-        while at > 0 && self.before(seating, at, (at - 1) / 2) {
-            self.swap(seating, at, (at - 1) / 2);
-            at = (at - 1) / 2;
-        }
-        seating.diamonds[self.front[at]].place = index(at);
-    }
-
-    fn sink(&mut self, seating: &mut Seating<'_>, mut at: usize) {
-        loop {
-            let first = self.first_of(seating, at);
-            if first == at {
-                return;
-            }
-            self.swap(seating, at, first);
-            at = first;
-        }
-    }
-
-    /// The first of a place of the heap and both below it.
-    fn first_of(&self, seating: &Seating<'_>, at: usize) -> usize {
-        let (left, right) = (2 * at + 1, 2 * at + 2);
-        let better = |kid, than| kid < self.front.len() && self.before(seating, kid, than);
-        let first = if better(left, at) { left } else { at };
-        if better(right, first) { right } else { first }
-    }
-
-    fn swap(&mut self, seating: &mut Seating<'_>, a: usize, b: usize) {
-        self.front.swap(a, b);
-        seating.diamonds[self.front[a]].place = index(a);
-        seating.diamonds[self.front[b]].place = index(b);
-    }
-
     /// Adds the content of the foremost bins to a list, the most urgent bin first, until it is as
     /// long as `most` or more.
-    pub fn list_first(&self, bins: &Bins, most: usize, out: &mut Vec<DiamondId>) {
-        out.extend_from_slice(&self.front);
+    pub fn list_first(
+        &self,
+        (diamonds, bins): (&Diamonds, &Bins),
+        most: usize,
+        out: &mut Vec<DiamondId>,
+    ) {
+        out.extend(self.front.iter().filter_map(|entry| entry.seated(diamonds)));
         for (word, mut bits) in self.occupied.iter().copied().enumerate().rev() {
             while bits != 0 && out.len() < most {
                 let bit = 63 - bits.leading_zeros();
@@ -245,8 +241,8 @@ impl Urgent {
     }
 
     /// Adds the set's content to a list, in no order.
-    pub fn list(&self, bins: &Bins, out: &mut Vec<DiamondId>) {
-        out.extend_from_slice(&self.front);
+    pub fn list(&self, (diamonds, bins): (&Diamonds, &Bins), out: &mut Vec<DiamondId>) {
+        out.extend(self.front.iter().filter_map(|entry| entry.seated(diamonds)));
         for (word, mut bits) in self.occupied.iter().copied().enumerate() {
             while bits != 0 {
                 bins.list(self.first_bin + index(word) * 64 + bits.trailing_zeros(), out);
@@ -277,10 +273,10 @@ mod tests {
                 last = bucket;
                 priority_px *= 1.000_3;
             }
-            assert_eq!(bucket_of(threshold_px, threshold_px), 2048);
+            assert_eq!(bucket_of(threshold_px, threshold_px), 4096);
             assert_eq!(bucket_of(f64::INFINITY, threshold_px), bucket_of(f64::MAX, threshold_px));
-            assert!(bucket_of(threshold_px * 1.001, threshold_px) > 2048);
-            assert!(bucket_of(threshold_px * 0.999, threshold_px) < 2048);
+            assert!(bucket_of(threshold_px * 1.001, threshold_px) > 4096);
+            assert!(bucket_of(threshold_px * 0.999, threshold_px) < 4096);
         }
     }
 
@@ -293,7 +289,7 @@ mod tests {
         let bins = &mut Bins::new(URGENT_BINS, 4);
         let seating = &mut Seating { diamonds: &mut diamonds, bins, priority_px: &priority_px };
         let mut expected = base;
-        expected.sort_by(|&a, &b| seating.order(a, b));
+        expected.sort_by(|&a, &b| seating.rank(a).order(&seating.rank(b)));
         if wins == Ordering::Greater {
             expected.reverse();
         }
@@ -301,7 +297,7 @@ mod tests {
         (0..4).for_each(|i| set.push(seating, base[(i + rotation) % 4]));
         for id in expected {
             assert_eq!(set.first(seating), Some(id), "{given:?}");
-            set.remove_from_front(seating, id);
+            seating.diamonds[id].seat = Seat::None;
         }
         assert_eq!(set.first(seating), None);
     }

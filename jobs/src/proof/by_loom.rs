@@ -15,6 +15,13 @@ use std::sync::Arc;
 struct Loom;
 
 impl Loom {
+    /// Whoever sleeps is woken, in a loop after the first claim.
+    const WORTH_WAKING_NS: u64 = 0;
+
+    fn clock_ns() -> u64 {
+        0
+    }
+
     /// Does not spin: what a spin finds later, a worker that goes to sleep finds as well.
     fn spin(_: u64, done: impl Fn() -> bool) -> bool {
         done()

@@ -6,7 +6,7 @@
 //! Keeps: nothing.
 //! Not here: workers with threads of their own (`wakes`).
 
-use crate::workers;
+use crate::{meet, workers};
 use overfly_jobs::{Graph, Span, Task, WorkerOptions, Workers};
 use std::iter;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -120,9 +120,7 @@ fn a_host_with_threads_helps_and_its_tasks_end_with_the_frame() {
     let workers = Workers::host(2, enqueue, |_| ()).unwrap();
     assert_eq!(result_of(&workers, 300), expected(300));
     // All three must be there at once, or this would hang.
-    let mut meeting = Graph::<Barrier>::new();
-    meeting.each(Span("meet"), &[], |_| 3, |barrier, _, _| _ = barrier.wait());
-    meeting.run(&Barrier::new(3), &workers).unwrap();
+    meet(&workers, 3);
     drop(workers);
     pool.into_iter().for_each(|thread| thread.join().unwrap());
 }
@@ -145,9 +143,7 @@ fn lent_threads_work_until_the_frame_closes() {
             scope.spawn(|| lend_until(&stop, &workers));
         }
         assert_eq!(result_of(&workers, 300), expected(300));
-        let mut meeting = Graph::<Barrier>::new();
-        meeting.each(Span("meet"), &[], |_| 3, |barrier, _, _| _ = barrier.wait());
-        meeting.run(&Barrier::new(3), &workers).unwrap();
+        meet(&workers, 3);
         stop.store(true, Ordering::Relaxed);
     });
 }
@@ -207,16 +203,13 @@ fn threads_are_named_as_asked() {
     let workers = Workers::with(options).unwrap();
     let names = Mutex::new(Vec::new());
     let mut graph = Graph::<(Barrier, &Mutex<Vec<String>>)>::new();
-    graph.each(
-        Span("name"),
-        &[],
-        |_| 2,
-        |(barrier, names), _, _| {
+    for span in [Span("one"), Span("two")] {
+        graph.stage(span, &[], |(barrier, names), _| {
             let name = thread::current().name().unwrap_or_default().to_owned();
             names.lock().unwrap().push(name);
             barrier.wait();
-        },
-    );
+        });
+    }
     graph.run(&(Barrier::new(2), &names), &workers).unwrap();
     assert!(names.lock().unwrap().contains(&"terrain-1".to_owned()));
 }
@@ -227,8 +220,6 @@ fn an_open_frame_costs_nothing_after_the_spin() {
     let workers = workers(2);
     let frame = workers.frame();
     thread::sleep(Duration::from_millis(3));
-    let mut meeting = Graph::<Barrier>::new();
-    meeting.each(Span("meet"), &[], |_| 3, |barrier, _, _| _ = barrier.wait());
-    meeting.run(&Barrier::new(3), &workers).unwrap();
+    meet(&workers, 3);
     drop(frame);
 }

@@ -16,7 +16,8 @@ mod soak;
 mod spans;
 mod wakes;
 
-use overfly_jobs::{Graph, Span, Team, Workers};
+use overfly_jobs::{Graph, Span, Team, Workers, now_ns};
+use std::sync::Barrier;
 
 /// Worker counts that every promise is tried with: none, fewer and more than this machine's cores.
 const COUNTS: [usize; 5] = [0, 1, 2, 4, 7];
@@ -49,5 +50,22 @@ impl Random {
 
     fn index(&mut self, end: usize) -> usize {
         usize::try_from(self.below(end as u64)).unwrap()
+    }
+}
+
+/// Returns once that many threads, the caller included, were in one run at the same time.
+fn meet(workers: &Workers, threads: usize) {
+    let mut graph = Graph::<Barrier>::new();
+    for _ in 0..threads {
+        graph.stage(Span("meet"), &[], |barrier, _| _ = barrier.wait());
+    }
+    graph.run(&Barrier::new(threads), workers).unwrap();
+}
+
+/// Works that long.
+fn toil(us: u64) {
+    let end_ns = now_ns() + us * 1000;
+    while now_ns() < end_ns {
+        std::hint::spin_loop();
     }
 }

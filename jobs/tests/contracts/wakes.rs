@@ -5,8 +5,8 @@
 //! Keeps: nothing.
 //! Not here: results (`loops`, `order`).
 
-use crate::{COUNTS, Random, run_one, workers};
-use overfly_jobs::{Graph, Span, StartError, Team, Workers};
+use crate::{COUNTS, Random, run_one, toil, workers};
+use overfly_jobs::{Graph, Span, StartError, Team, WorkerOptions, Workers};
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
@@ -41,19 +41,44 @@ fn twenty_thousand_short_runs_with_pauses_lose_no_wake_up() {
 }
 
 #[test]
-fn sleeping_workers_are_woken_for_stages_and_for_chunks() {
-    // Each barrier lets nobody pass until every worker is there: serial execution would hang.
+fn sleeping_workers_are_woken_for_stages() {
+    // The barrier lets nobody pass until every worker is there: serial execution would hang.
     let workers = workers(3);
     let meet = Barrier::new(4);
     let mut graph = Graph::<Barrier>::new();
-    let sides = [Span("a"), Span("b"), Span("c"), Span("d")]
-        .map(|span| graph.stage(span, &[], |meet, _| _ = meet.wait()));
-    graph.stage(Span("loop"), &sides, |meet, team| team.for_each_index(4, |_| _ = meet.wait()));
+    for span in [Span("a"), Span("b"), Span("c"), Span("d")] {
+        graph.stage(span, &[], |meet, _| {
+            meet.wait();
+            // So long that the next run remembers it as worth a wake-up.
+            toil(100);
+        });
+    }
     for _ in 0..50 {
         graph.run(&meet, &workers).unwrap();
         // Longer than the spin: the next run finds all asleep.
         thread::sleep(Duration::from_millis(1));
     }
+}
+
+#[test]
+fn sleeping_workers_are_woken_for_long_chunks() {
+    let workers = workers(3);
+    let note = |helped: &AtomicU32, caller| {
+        toil(100);
+        helped.fetch_add(u32::from(thread::current().id() != caller), Ordering::Relaxed);
+    };
+    let caller = thread::current().id();
+    let mut graph = Graph::<(AtomicU32, AtomicU32)>::new();
+    let split = graph.stage(Span("loop"), &[], move |helped, team| {
+        team.for_each_index(16, |_| note(&helped.0, caller));
+    });
+    graph.each(Span("each"), &[split], |_| 16, move |helped, _, _| note(&helped.1, caller));
+    let helped = (AtomicU32::new(0), AtomicU32::new(0));
+    for _ in 0..50 {
+        graph.run(&helped, &workers).unwrap();
+        thread::sleep(Duration::from_millis(1));
+    }
+    assert!(helped.0.into_inner() > 0 && helped.1.into_inner() > 0);
 }
 
 #[test]
@@ -75,7 +100,9 @@ fn a_caller_that_sleeps_is_woken_by_the_last_stage() {
 
 #[test]
 fn an_owner_that_sleeps_is_woken_by_the_last_chunk() {
-    let workers = workers(1);
+    // Chunks that wait for each other need a worker woken before the first: chaos always wakes.
+    let options = WorkerOptions { count: 1, chaos: Some(3), ..WorkerOptions::default() };
+    let workers = Workers::with(options).unwrap();
     let mut graph = Graph::<Barrier>::new();
     graph.stage(Span("tail"), &[], |meet, team| {
         let stage_thread = thread::current().id();
