@@ -138,16 +138,21 @@ pub struct Engine {
 impl Engine {
     /// The base mesh, with room for a preset's flights.
     pub fn new(preset: Preset) -> Self {
+        Self::capped(preset, u32::MAX)
+    }
+
+    /// The same, with so many splits and as many merges in one frame at most.
+    pub fn capped(preset: Preset, operations_max: u32) -> Self {
         let leaves = u32::try_from(preset.cruise_start().0).expect("at most 16 million");
-        let unlimited = Knobs {
+        let knobs = Knobs {
             tolerance_px: TOLERANCE,
             leaves_max: u32::MAX,
-            splits_max: u32::MAX,
-            merges_max: u32::MAX,
+            splits_max: operations_max,
+            merges_max: operations_max,
             level_max: u8::MAX,
         };
         // A diamond has two leaves but on the border, where it has one.
-        let mut mesh = Mesh::new(leaves + leaves / 4, unlimited);
+        let mut mesh = Mesh::new(leaves + leaves / 4, knobs);
         mesh.create_base();
         let rule = LebRule::new(preset.threshold_squared());
         Self { mesh, rule, before: None, judges_all: false }

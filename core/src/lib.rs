@@ -4,8 +4,8 @@
 //! |---|---|---|
 //! | `camera` | views | [`camera::Camera`] of each view |
 //! | `admit` | arrived pages | resident pages |
-//! | `prioritise` | cameras, diamonds | priority of every queued diamond |
-//! | `refine` | queues, pages | splits and merges: the mesh, the wanted pages |
+//! | `prioritise` | motion, diamonds that are due | verdicts, and how long they last |
+//! | `refine` | agenda, pages | splits and merges: the mesh, the wanted pages |
 //! | `build` | new leaves, pages | vertices of new patches |
 //! | `place` | cameras, patches | draws of each view and depth range |
 //!

@@ -56,6 +56,39 @@ fn every_listed_frame_of_1m() {
 }
 
 #[test]
+fn at_a_speed_beyond_the_counts_the_mesh_lags_and_neither_side_starves() {
+    let preset = Preset::L50k;
+    let flight = FLIGHTS[1];
+    let mut engine = Engine::capped(preset, 40);
+    let mut frames_up = 0;
+    while engine.frame(flight.eye(0)).splits > 0 {
+        frames_up += 1;
+        assert!(frames_up < 2_000, "no end of the cold start");
+    }
+    assert_eq!(engine.tally().leaves, preset.cruise_start().0);
+    let (mut splits, mut merges) = (0, 0);
+    for frame in 1..=600 {
+        let done = engine.frame(flight.eye(frame));
+        assert!(done.splits <= 40 && done.merges <= 40);
+        (splits, merges) = (splits + done.splits, merges + done.merges);
+        if frame % 50 == 0 {
+            let wanted =
+                recursion::count(&Rule::new(preset.threshold_squared(), flight.eye(frame)));
+            let leaves = engine.tally().leaves as f64 / wanted.leaves as f64;
+            assert!((0.8..1.25).contains(&leaves), "frame {frame}: {leaves} of the leaves");
+        }
+    }
+    // Some 94 splits and 92 merges a frame would be needed: both counts are spent.
+    assert!(splits > 39 * 590 && merges > 39 * 590, "{splits} splits, {merges} merges");
+    for _ in 0..3_000 {
+        engine.frame(flight.eye(600));
+    }
+    let (tally, digest) =
+        recursion::digest(&Rule::new(preset.threshold_squared(), flight.eye(600)));
+    assert_eq!(engine.digest(), (tally, digest), "once the eye rests, the mesh is the exact one");
+}
+
+#[test]
 fn turns_stops_and_jumps_leave_the_mesh_of_the_recursion() {
     let preset = Preset::L50k;
     let mut engine = Engine::new(preset);

@@ -73,7 +73,7 @@
 //!   it when its first chunks show that the others last longer than waking takes. So a chunk must
 //!   not wait for another.
 //! - **Times cost next to nothing when off.** Without [`Graph::record_spans`] the clock is read
-//!   only between the claims of a loop while somebody sleeps.
+//!   only where somebody sleeps: between the claims of a loop, and around the stages of that run.
 //!
 //! # Whose threads
 //!
