@@ -137,7 +137,8 @@ impl Urgent {
             front: BinaryHeap::with_capacity(capacity as usize),
             front_bin: URGENT_BINS,
             drained: Vec::with_capacity(capacity as usize),
-            stamp: 0,
+            // Even for leaves and odd for parents: an entry of the one is never a seat in the other.
+            stamp: u32::from(wins == Ordering::Less),
             threshold_px: 1.0,
         }
     }
@@ -160,7 +161,7 @@ impl Urgent {
     }
 
     fn push_front(&mut self, seating: &mut Seating<'_>, id: DiamondId) {
-        self.stamp = self.stamp.wrapping_add(1);
+        self.stamp = self.stamp.wrapping_add(2);
         let record = &mut seating.diamonds[id];
         (record.seat, record.place) = (Seat::Front, self.stamp);
         self.front.push(Entry::new(seating.rank(id), self.wins, (self.stamp, id)));
@@ -310,5 +311,22 @@ mod tests {
                 sorts(Ordering::Less, given, rotation);
             }
         }
+    }
+
+    #[test]
+    fn a_seat_given_up_in_one_set_is_no_seat_in_it_when_the_other_gives_one() {
+        let mut diamonds = Diamonds::new(4);
+        let [id, ..] = diamonds.create_base();
+        let priority_px = Column::new(4, || 1.0);
+        let bins = &mut Bins::new(2 * URGENT_BINS, 4);
+        let seating = &mut Seating { diamonds: &mut diamonds, bins, priority_px: &priority_px };
+        let mut leaves = Urgent::new(0, Ordering::Greater, 4);
+        let mut parents = Urgent::new(URGENT_BINS, Ordering::Less, 4);
+        leaves.push(seating, id);
+        assert_eq!(leaves.first(seating), Some(id));
+        seating.diamonds[id].seat = Seat::None;
+        parents.push(seating, id);
+        assert_eq!(parents.first(seating), Some(id));
+        assert_eq!(leaves.first(seating), None);
     }
 }
