@@ -16,7 +16,7 @@
 //!
 //! Certainty. With d the distance bound, the error is on the threshold where d = R = e·f/threshold.
 //! If the eye moves by m, the heights change by at most m and √((ρ+h)(ρ+k))·|n−m| by at most λm
-//! (λ is 1 nearby, see [`Sight::stretch`]), so d changes by at most λm. Where the threshold over f
+//! (λ is 1 nearby, see `stretch` below), so d changes by at most λm. Where the threshold over f
 //! falls or rises by a share Δ, R changes by at most RΔ. A plane's value over the region changes by
 //! at most m, and by L·φ when its unit normal changes by φ, L the region's farthest point. The
 //! horizon's reach changes with the tangent length of the eye. So a slack in metres, minus λm, RΔ,
