@@ -10,6 +10,11 @@ use crate::units::Radians;
 use core::fmt;
 use glam::{DMat3, DQuat, DVec3};
 
+/// Narrower lenses would make priorities overflow.
+const FIELD_OF_VIEW_MIN: Radians = Radians(1e-6);
+/// So would nearer ground.
+const NEAR_MIN_M: f64 = 1e-6;
+
 /// One view of a frame, as a host gives it and a recording keeps it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct View {
@@ -17,11 +22,11 @@ pub struct View {
     pub eye: Ecef,
     /// Camera axes (x right, y up, z backward) to body-fixed axes; need not be normalised.
     pub orientation: DQuat,
-    /// Vertical field of view, in (0, π).
+    /// Vertical field of view, in [1e-6, π).
     pub field_of_view: Radians,
     /// Width and height of the picture in pixels, at least 1.
     pub size_px: [u32; 2],
-    /// Nothing nearer than this is drawn; metres, above zero.
+    /// Nothing nearer than this is drawn; at least 1e-6 metres.
     pub near_m: f64,
 }
 
@@ -35,14 +40,14 @@ pub enum ViewFault {
     },
     /// The orientation quaternion is zero.
     NoOrientation,
-    /// The field of view is outside (0, π).
+    /// The field of view is outside [1e-6, π).
     FieldOfView {
         /// What was given, in radians.
         found_rad: f64,
     },
     /// Width or height is zero.
     NoPixels,
-    /// The near distance is not above zero.
+    /// The near distance is less than 1e-6 m.
     Near {
         /// What was given, in metres.
         found_m: f64,
@@ -57,12 +62,12 @@ impl fmt::Display for ViewFault {
             Self::FieldOfView { found_rad } => {
                 write!(
                     f,
-                    "view: field of view is {found_rad} rad, allowed is 0 to π, both excluded"
+                    "view: field of view is {found_rad} rad, allowed is 1e-6 to π, π excluded"
                 )
             }
             Self::NoPixels => write!(f, "view: width and height must be at least 1 pixel"),
             Self::Near { found_m } => {
-                write!(f, "view: near distance is {found_m} m, must be above 0")
+                write!(f, "view: near distance is {found_m} m, must be at least 1e-6")
             }
         }
     }
@@ -85,13 +90,15 @@ impl View {
         if self.orientation.length_squared() == 0.0 {
             return Err(ViewFault::NoOrientation);
         }
-        if !(self.field_of_view.0 > 0.0 && self.field_of_view.0 < core::f64::consts::PI) {
+        if !(self.field_of_view.0 >= FIELD_OF_VIEW_MIN.0
+            && self.field_of_view.0 < core::f64::consts::PI)
+        {
             return Err(ViewFault::FieldOfView { found_rad: self.field_of_view.0 });
         }
         if self.size_px.contains(&0) {
             return Err(ViewFault::NoPixels);
         }
-        if self.near_m <= 0.0 {
+        if self.near_m < NEAR_MIN_M {
             return Err(ViewFault::Near { found_m: self.near_m });
         }
         Ok(())
@@ -245,7 +252,7 @@ mod tests {
             with(|v| v.orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
             ViewFault::NoOrientation
         );
-        for fov in [0.0, -1.0, core::f64::consts::PI] {
+        for fov in [0.0, -1.0, 1e-303, 9e-7, core::f64::consts::PI] {
             let mut view = good;
             view.field_of_view = Radians(fov);
             assert_eq!(view.check(), Err(ViewFault::FieldOfView { found_rad: fov }));

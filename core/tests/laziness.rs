@@ -137,6 +137,30 @@ fn below_the_ground_and_far_out_in_space() {
 }
 
 #[test]
+fn a_slow_flight_after_a_way_between_the_stars() {
+    let mut settings = scene(4, 40_000);
+    settings.lod.tolerance.0 = 60.0;
+    let views = |frame: u32| {
+        let height_m = if (2..4).contains(&frame) { 1e16 } else { 3_000.0 };
+        vec![view(&EARTH, at(46.8, -121.8 + 1e-5 * f64::from(frame), height_m), 80.0, -8.0)]
+    };
+    side_by_side(&settings, 3_600, views, |_, _| true);
+}
+
+#[test]
+fn the_narrowest_lens_and_the_nearest_ground() {
+    let settings = scene(4, 30_000);
+    let lenses_rad = [1.0, 1e-6, 1e-5, 0.5];
+    let views = |frame: u32| {
+        let mut one = view(&EARTH, at(46.8, -121.8 + 1e-5 * f64::from(frame), 3_000.0), 80.0, -8.0);
+        one.near_m = if frame < 30 { 1e-6 } else { 0.1 };
+        one.field_of_view = Radians(lenses_rad[frame as usize / 6 % lenses_rad.len()]);
+        vec![one]
+    };
+    side_by_side(&settings, 60, views, |_, _| true);
+}
+
+#[test]
 fn a_still_eye_is_judged_no_more() {
     let mut rig = Rig::new(&scene(4, 60_000), 0);
     let views = [view(&EARTH, at(46.8, -121.8, 3_000.0), 80.0, -8.0)];

@@ -184,7 +184,7 @@ impl Agenda {
             }
             return;
         }
-        if let Some(motion) = motion {
+        if let Some(motion) = motion.filter(Motion::is_countable) {
             wheels.advance(&motion);
             (self.band.course, self.band.course_m) = wheels.course();
             // Both closures need both lists, one after the other.
@@ -336,7 +336,8 @@ impl Agenda {
         all
     }
 
-    /// Bytes in use besides the records: priorities, bins, lists.
+    /// Bytes in use besides the records: priorities, bins, lists. Two heaps of 32 bytes a diamond
+    /// are reserved besides, of which only the foremost bin is touched.
     pub fn bytes(&self, diamonds: u32) -> usize {
         let per_diamond = size_of::<f64>() + 4 * size_of::<DiamondId>();
         diamonds as usize * per_diamond + self.bins.bytes()

@@ -231,7 +231,7 @@ impl Mesh {
         self.step = STEP / 2.0;
         self.judge_late(rule);
         self.merge_needless(rule);
-        self.agenda.look_ahead(&self.diamonds, Role::Leaf, self.knobs.splits_max);
+        self.look_ahead(Role::Leaf, self.knobs.splits_max);
         while self.done.splits < self.knobs.splits_max {
             self.warm_every(self.done.splits);
             if !self.split_first(rule) {
@@ -259,7 +259,7 @@ impl Mesh {
 
     /// Merges what the tolerance does not ask for: one exact threshold, no hysteresis.
     fn merge_needless(&mut self, rule: &mut impl Rule) {
-        self.agenda.look_ahead(&self.diamonds, Role::Parent, self.knobs.merges_max);
+        self.look_ahead(Role::Parent, self.knobs.merges_max);
         while self.done.merges < self.knobs.merges_max {
             let Some(id) = self.agenda.first_parent(&mut self.diamonds) else { break };
             if self.agenda.priority_px[id] > self.knobs.tolerance_px {
@@ -270,11 +270,21 @@ impl Mesh {
         }
     }
 
-    /// Where the tolerance decides, every urgent diamond is operated on: loads memory ahead.
-    fn warm_every(&mut self, operation: u32) {
+    /// Whether memory is worth to be loaded ahead: where the tolerance decides, every urgent
+    /// diamond is operated on, and a large mesh is in no cache.
+    fn warms(&self) -> bool {
         let sure = self.agenda.band().parent_px <= self.knobs.tolerance_px;
-        let is_large = self.diamonds.live() > CACHED;
-        if sure && is_large && (operation as usize).is_multiple_of(WARM) {
+        sure && self.diamonds.live() > CACHED
+    }
+
+    fn look_ahead(&mut self, role: Role, most: u32) {
+        if self.warms() {
+            self.agenda.look_ahead(&self.diamonds, role, most);
+        }
+    }
+
+    fn warm_every(&mut self, operation: u32) {
+        if (operation as usize).is_multiple_of(WARM) && self.warms() {
             self.agenda.warm_next(&self.diamonds);
         }
     }

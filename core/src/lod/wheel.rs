@@ -64,7 +64,7 @@ pub struct Motion {
     pub step_m: DVec3,
     /// Change of the horizon's tangent length, metres.
     pub lift_m: f64,
-    /// Change of a frustum plane's unit normal, radians or more.
+    /// Length of the change of a frustum plane's unit normal.
     pub turn: f64,
     /// Change of the pixels per radian over the lesser of both.
     pub zoom: f64,
@@ -74,6 +74,11 @@ impl Motion {
     /// Whether nothing at all has happened.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Whether odometers can count it: a finite motion, not as long as a way between planets.
+    pub fn is_countable(&self) -> bool {
+        self.path_m < 1e9 && self.lift_m < 1e9 && self.turn < 1e3 && self.zoom < 1e3
     }
 
     /// The greater of each.
@@ -111,8 +116,10 @@ pub const WHEEL_BINS: u32 = 5 * 64 * 16 * 8;
 
 const _: () = assert!(WHEEL_BINS as usize == FAMILIES * CLASSES * OCTAVES * SLOTS);
 
-/// Sums are rounded up by this.
-const UP: f64 = 1.0 + 1e-12;
+/// A sum that is never too small, however little is added to however much.
+fn up(sum: f64, step: f64) -> f64 {
+    if step > 0.0 { (sum + step).next_up() } else { sum }
+}
 
 /// Odometers and wheels.
 pub struct Wheels {
@@ -163,9 +170,9 @@ impl Wheels {
         for course in &mut self.courses {
             let along_m = course.axis.dot(step_m);
             let forward_m = if along_m > 0.0 { along_m } else { 0.0 };
-            course.forward_m += forward_m * UP;
+            course.forward_m = up(course.forward_m, forward_m * (1.0 + 1e-12));
             let aside_m = (step_m - course.axis * forward_m).length();
-            course.aside_m += aside_m * UP + forward_m * 1e-15;
+            course.aside_m = up(course.aside_m, aside_m * (1.0 + 1e-12) + forward_m * 1e-15);
         }
         let length_m = step_m.length();
         if length_m > 0.0 && self.course().0.dot(step_m) < SAME_COURSE * length_m {
@@ -176,24 +183,24 @@ impl Wheels {
         }
     }
 
-    /// Counts a motion. Every sum is rounded up by more than its rounding error.
+    /// Counts a motion.
     pub fn advance(&mut self, motion: &Motion) {
         self.follow(motion.step_m);
-        self.path_m += motion.path_m * UP;
-        self.lift_m += motion.lift_m * UP;
-        self.turn += motion.turn * UP;
-        self.drift[0] += motion.zoom * UP;
-        self.drift[1] += motion.zoom * UP;
+        self.path_m = up(self.path_m, motion.path_m);
+        self.lift_m = up(self.lift_m, motion.lift_m);
+        self.turn = up(self.turn, motion.turn);
+        self.drift[0] = up(self.drift[0], motion.zoom);
+        self.drift[1] = up(self.drift[1], motion.zoom);
     }
 
     /// Counts a fall of the threshold of leaves.
     pub fn leaf_threshold_fell(&mut self, from_px: f64, to_px: f64) {
-        self.drift[0] += (from_px - to_px) / to_px * (1.0 + 1e-12);
+        self.drift[0] = up(self.drift[0], (from_px - to_px) / to_px * (1.0 + 1e-12));
     }
 
     /// Counts a rise of the threshold of parents.
     pub fn parent_threshold_rose(&mut self, from_px: f64, to_px: f64) {
-        self.drift[1] += (to_px - from_px) / from_px * (1.0 + 1e-12);
+        self.drift[1] = up(self.drift[1], (to_px - from_px) / from_px * (1.0 + 1e-12));
     }
 
     fn reading(&self, family: usize, class: usize) -> f64 {
@@ -285,6 +292,11 @@ impl Wheels {
 
     /// Calls `empty` with every bin in use; they count as empty.
     pub fn pass_all(&mut self, mut empty: impl FnMut(u32)) {
+        // Nobody's deadline is left, so the odometers may start anew.
+        (self.path_m, self.lift_m, self.turn, self.drift) = (0.0, 0.0, 0.0, [0.0; 2]);
+        for course in &mut self.courses {
+            (course.forward_m, course.aside_m) = (0.0, 0.0);
+        }
         self.is_new_course = false;
         for wheel in 0..self.slots.len() {
             self.empty_slots(wheel, self.slots[wheel], &mut empty);
