@@ -5,6 +5,8 @@
 //! Keeps: nothing.
 //! Not here: what changed since the last frame, which is all an incremental engine has to find.
 
+use overfly_core::geodesy::frames::narrow;
+
 /// A point of the unit square, or the way between two.
 type Point = [f64; 2];
 
@@ -228,10 +230,4 @@ fn mix(z: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
-}
-
-/// A coordinate relative to the eye as a vertex holds it.
-#[expect(clippy::cast_possible_truncation, reason = "vertices are f32 once they are eye-relative")]
-fn narrow(coordinate: f64) -> f32 {
-    coordinate as f32
 }

@@ -12,6 +12,7 @@ use leb::answers::ANSWERS;
 use leb::recursion::{Rule, Tally, count, digest, vertices};
 use leb::stats::{PerFrame, Row, Summary, header};
 use leb::workload::{Flight, Path, Preset, Speed};
+use overfly_core::geodesy::frames::narrow;
 
 const FLIGHTS: [Flight; 3] = [
     Flight { path: Path::Cruise, speed: Speed::V1 },
@@ -89,9 +90,8 @@ fn the_leaves_are_those_of_the_rule_as_written_at_frames_nobody_listed() {
 }
 
 /// The vertices of leaves as seen from the eye.
-#[expect(clippy::cast_possible_truncation, reason = "eye-relative vertices are f32")]
 fn eye_relative(leaves: &[([[f64; 2]; 3], u32)], eye: [f64; 3]) -> Vec<[[f32; 3]; 3]> {
-    let vertex = |v: [f64; 2]| [(v[0] - eye[0]) as f32, (v[1] - eye[1]) as f32, -eye[2] as f32];
+    let vertex = |v: [f64; 2]| [v[0] - eye[0], v[1] - eye[1], -eye[2]].map(narrow);
     leaves.iter().map(|(triangle, _)| triangle.map(vertex)).collect()
 }
 

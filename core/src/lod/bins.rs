@@ -179,11 +179,6 @@ impl Bins {
         }
     }
 
-    /// The bin in which a place is.
-    pub fn bin_of(&self, place: u32) -> u32 {
-        self.chunks[(place / 16) as usize].bin
-    }
-
     /// Whether `place` holds `id`, for checks.
     pub fn holds(&self, place: u32, id: DiamondId) -> bool {
         let chunk = self.chunks.get((place / 16) as usize);

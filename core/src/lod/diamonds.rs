@@ -240,11 +240,6 @@ impl Diamonds {
         self.used_end
     }
 
-    /// Most diamonds that can have a record at once.
-    pub fn capacity(&self) -> u32 {
-        self.capacity
-    }
-
     /// All diamonds with a record, by index.
     pub fn ids(&self) -> impl Iterator<Item = DiamondId> + use<'_> {
         let all = (0..self.used_end).map(Id::new);
