@@ -16,11 +16,11 @@ use std::thread::JoinHandle;
 /// The threads, and what is in flight.
 pub struct Loader {
     jobs: Option<Sender<PageKey>>,
-    done: Receiver<Box<Page>>,
+    done: Receiver<Arc<Page>>,
     threads: Vec<JoinHandle<()>>,
     in_flight: BTreeSet<PageKey>,
     /// Pages that are ready and wait for their time or their turn.
-    ready: BTreeMap<PageKey, Box<Page>>,
+    ready: BTreeMap<PageKey, Arc<Page>>,
     /// Live arrivals: keys in the order asked for, with the time before which they stay away.
     due: Vec<(PageKey, u64)>,
 }
@@ -52,7 +52,7 @@ impl Loader {
     }
 
     /// Waits for exactly these pages and appends them in this order.
-    pub fn fetch(&mut self, keys: &[PageKey], arrived: &mut Vec<Box<Page>>) {
+    pub fn fetch(&mut self, keys: &[PageKey], arrived: &mut Vec<Arc<Page>>) {
         keys.iter().for_each(|&key| self.ask(key));
         for &key in keys {
             while !self.ready.contains_key(&key) {
@@ -77,7 +77,7 @@ impl Loader {
     }
 
     /// Appends what was requested, is ready and due, in the order of the requests.
-    pub fn collect(&mut self, arrived: &mut Vec<Box<Page>>) {
+    pub fn collect(&mut self, arrived: &mut Vec<Arc<Page>>) {
         while let Ok(page) = self.done.try_recv() {
             self.put(page);
         }
@@ -100,14 +100,14 @@ impl Loader {
         }
     }
 
-    fn put(&mut self, page: Box<Page>) {
+    fn put(&mut self, page: Arc<Page>) {
         self.in_flight.remove(&page.key);
         self.ready.insert(page.key, page);
     }
 }
 
 /// Makes pages until there is nobody left to ask or to answer.
-fn serve(todo: &Receiver<PageKey>, finished: &Sender<Box<Page>>, generator: &Generator) {
+fn serve(todo: &Receiver<PageKey>, finished: &Sender<Arc<Page>>, generator: &Generator) {
     for key in todo {
         if finished.send(generator.page(key)).is_err() {
             break;

@@ -17,6 +17,7 @@ use overfly::{FrameError, Overfly};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::ops::Range;
+use std::sync::Arc;
 
 const SIZE_PX: [u32; 2] = [1280, 720];
 
@@ -91,7 +92,7 @@ struct Run<'a> {
 /// All pages that a flight asked for so far.
 struct Store {
     loader: Loader,
-    pages: BTreeMap<PageKey, Box<Page>>,
+    pages: BTreeMap<PageKey, Arc<Page>>,
 }
 
 /// Flies a case as often as it says and keeps the least of each time.
@@ -245,7 +246,7 @@ impl Run<'_> {
 
 impl Store {
     /// Appends these pages, in this order; those not made yet are waited for.
-    fn fetch(&mut self, keys: &[PageKey], arrived: &mut Vec<Box<Page>>) {
+    fn fetch(&mut self, keys: &[PageKey], arrived: &mut Vec<Arc<Page>>) {
         let lacking = keys.iter().filter(|key| !self.pages.contains_key(key));
         let lacking: Vec<PageKey> = lacking.copied().collect();
         let mut made = Vec::new();

@@ -14,6 +14,7 @@ use crate::lattice::{cross_of, normal_of, signs, unfold};
 use crate::lod::reach::{DIAGONAL, EXTENT_EVEN, NORM_MIN, edges};
 use crate::settings::SceneSettings;
 use glam::{DVec3, IVec3};
+use std::sync::Arc;
 
 /// Everything that the pages of one scene are made from.
 pub struct Generator {
@@ -41,7 +42,7 @@ impl Generator {
     }
 
     /// Makes one page.
-    pub fn page(&self, key: PageKey) -> Box<Page> {
+    pub fn page(&self, key: PageKey) -> Arc<Page> {
         let mut page = Box::new(Page {
             key,
             heights_m: [0.0; SAMPLES],
@@ -49,12 +50,13 @@ impl Generator {
             layers: [[0; 4]; SAMPLES],
             bounds: [Bound::default(); BOUND_SIDE * BOUND_SIDE],
             height_range_m: [f32::MAX, f32::MIN],
+            survey: None,
             content: 0,
         });
         self.fill_samples(&mut page);
         self.fill_normals(&mut page);
         page.content = content_of(&page);
-        page
+        Arc::from(page)
     }
 
     fn fill_samples(&self, page: &mut Page) {

@@ -5,7 +5,7 @@
 //! Keeps: nothing.
 //! Not here: what a page holds (`page`), which are resident (`pages`).
 
-use crate::lattice::{Quadrant, RADIUS, fold};
+use crate::lattice::{Quadrant, RADIUS, fold, signs};
 use core::fmt;
 use glam::IVec3;
 
@@ -51,6 +51,40 @@ impl PageKey {
     /// As 64 bits, for files and digests.
     pub fn bits(self) -> u64 {
         self.0
+    }
+
+    /// The cell in the whole octahedral square, as tile archives count: zoom, column and row from
+    /// the square's lower left corner (−x−y). The north pole is in the middle, the south pole at
+    /// all four corners. A tile keeps its quadrant's own u and v, away from the pole.
+    pub fn zxy(self) -> (u8, u32, u32) {
+        let half = 1 << self.depth();
+        let (sx, sy) = signs(self.quadrant());
+        let place = |sign: i32, along: u32| if sign > 0 { half + along } else { half - 1 - along };
+        (self.depth() + 1, place(sx, self.x()), place(sy, self.y()))
+    }
+
+    /// The page of a tile; `None` where the tile is no page.
+    pub fn from_zxy(z: u8, x: u32, y: u32) -> Option<Self> {
+        let depth = z.checked_sub(1).filter(|&depth| depth <= DEPTH_MAX)?;
+        let half = 1_u32 << depth;
+        if x >> z != 0 || y >> z != 0 {
+            return None;
+        }
+        let (east, north) = (x >= half, y >= half);
+        let quadrant = (0..4)
+            .find(|&q| signs(q) == (if east { 1 } else { -1 }, if north { 1 } else { -1 }))?;
+        let along =
+            |positive: bool, place: u32| if positive { place - half } else { half - 1 - place };
+        Some(Self::new(quadrant, depth, along(east, x), along(north, y)))
+    }
+
+    /// The page of some lesser depth that holds this one, or itself.
+    ///
+    /// # Panics
+    /// If `depth` is greater than its own.
+    pub fn ancestor(self, depth: u8) -> Self {
+        let up = self.depth() - depth;
+        Self::new(self.quadrant(), depth, self.x() >> up, self.y() >> up)
     }
 
     /// Depth in the quadtree; roots are 0.
@@ -135,6 +169,11 @@ mod tests {
             assert_eq!(child.child_index(), index);
             assert_eq!(child.step() * 2, key.step());
         }
+        for key in (0..4).flat_map(|q| [PageKey::root(q), PageKey::new(q, 9, 511, 3)]) {
+            let (z, x, y) = key.zxy();
+            assert_eq!(PageKey::from_zxy(z, x, y), Some(key));
+        }
+        assert_eq!(PageKey::from_zxy(0, 0, 0), None);
         assert_eq!(PageKey::root(2).parent(), None);
         assert_eq!(PageKey::from_bits(u64::MAX), None);
         assert_eq!(PageKey::new(0, DEPTH_MAX, 0, 0).step(), 2);

@@ -40,12 +40,35 @@ impl Bound {
     }
 }
 
-/// One page: about 54 KiB, all of it inline.
+/// Where a sample comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(u8)]
+pub enum Origin {
+    /// The procedural planet alone, or nothing where a scene has none.
+    #[default]
+    Procedural,
+    /// Real elevation.
+    Measured,
+    /// A void of the real elevation, filled from around it or from coarser data.
+    Filled,
+}
+
+/// What real elevation adds to a page: 21 KiB.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Survey {
+    /// Height of sea level above the ellipsoid at each sample: the geoid's undulation in metres.
+    pub sea_level_m: [f32; SAMPLES],
+    /// Where each sample comes from.
+    pub origin: [Origin; SAMPLES],
+}
+
+/// One page: about 54 KiB, all of it inline but the survey.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Page {
     /// Which cell.
     pub key: PageKey,
-    /// Heights above the ellipsoid in metres; sample (i, j) at `j * PAGE_SIDE + i`.
+    /// Heights above sea level in metres; sample (i, j) at `j * PAGE_SIDE + i`. Sea level is the
+    /// ellipsoid where there is no survey.
     pub heights_m: [f32; SAMPLES],
     /// Body-fixed ground normals, octahedral encoding, ±32767 is ±1.
     pub normals: [[i16; 2]; SAMPLES],
@@ -55,6 +78,8 @@ pub struct Page {
     pub bounds: [Bound; BOUND_SIDE * BOUND_SIDE],
     /// Least and greatest sample in metres.
     pub height_range_m: [f32; 2],
+    /// What real elevation knows; pages of procedural planets have none.
+    pub survey: Option<Box<Survey>>,
     /// Hash of all of the above.
     pub content: u64,
 }
@@ -67,6 +92,18 @@ impl Page {
     pub fn sample_index(&self, point: IVec3) -> usize {
         let (i, j) = self.cell(point, self.key.step());
         j * PAGE_SIDE + i
+    }
+
+    /// Sea level above the ellipsoid at sample `at`, in metres.
+    pub fn sea_level_m(&self, at: usize) -> f64 {
+        self.survey.as_ref().map_or(0.0, |survey| f64::from(survey.sea_level_m[at]))
+    }
+
+    /// Height of the drawn surface above the ellipsoid at sample `at`, in metres: the ground, or
+    /// where there is a sea and the ground lies below its level, the water.
+    pub fn surface_m(&self, at: usize, sea: bool) -> f64 {
+        let ground_m = f64::from(self.heights_m[at]);
+        self.sea_level_m(at) + if sea && ground_m < 0.0 { 0.0 } else { ground_m }
     }
 
     /// The bound around a lattice point of this page: the worst of the kept ones that enclose it,

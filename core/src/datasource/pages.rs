@@ -9,11 +9,12 @@ use super::key::PageKey;
 use super::page::Page;
 use crate::columns::{Column, Id, Pool};
 use crate::digest::mix;
+use std::sync::Arc;
 
 /// All resident pages, as columns.
 pub struct Pages {
     /// The samples; empty while the place is free.
-    pub page: Column<Page, Option<Box<Page>>>,
+    pub page: Column<Page, Option<Arc<Page>>>,
     /// Resident children by [`PageKey::child_index`].
     pub children: Column<Page, [Option<Id<Page>>; 4]>,
     /// The parent; empty for roots.
@@ -106,9 +107,9 @@ impl Pages {
     /// Stage `admit`: takes arrived pages in, in their order, evicting what nobody uses.
     pub fn admit(
         &mut self,
-        arrived: &mut Vec<Box<Page>>,
+        arrived: &mut Vec<Arc<Page>>,
         frame: u64,
-        evicted: &mut Vec<Box<Page>>,
+        evicted: &mut Vec<Arc<Page>>,
     ) -> Admission {
         let mut done = Admission::default();
         for page in arrived.drain(..) {
@@ -131,7 +132,7 @@ impl Pages {
         done
     }
 
-    fn insert(&mut self, page: Box<Page>, parent: Option<Id<Page>>, frame: u64) {
+    fn insert(&mut self, page: Arc<Page>, parent: Option<Id<Page>>, frame: u64) {
         let key = page.key;
         let id = self.pool.take().expect("room was checked or made");
         self.digest = self.digest.wrapping_add(mix(mix(key.bits()) ^ page.content));
@@ -147,7 +148,7 @@ impl Pages {
     }
 
     /// Evicts the page that has been idle longest, the greater key first among equals.
-    fn evict_one(&mut self, frame: u64, evicted: &mut Vec<Box<Page>>) -> bool {
+    fn evict_one(&mut self, frame: u64, evicted: &mut Vec<Arc<Page>>) -> bool {
         let idle = self.ids().filter(|&id| self.evictable(id, frame));
         let oldest = idle.min_by_key(|&id| (self.last_use[id], !self.get(id).key.bits()));
         let Some(id) = oldest else { return false };

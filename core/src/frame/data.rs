@@ -8,6 +8,7 @@
 use crate::camera::{Camera, View};
 use crate::datasource::{Page, PageKey};
 use crate::digest::FrameDigest;
+use std::sync::Arc;
 
 /// What one frame starts from.
 #[derive(Default)]
@@ -17,7 +18,7 @@ pub struct FrameInput {
     /// The views to serve, the most important first.
     pub views: Vec<View>,
     /// Pages that arrived since the last frame, in this order. The frame takes them out.
-    pub arrived: Vec<Box<Page>>,
+    pub arrived: Vec<Arc<Page>>,
 }
 
 /// What one frame ended in.
@@ -30,7 +31,7 @@ pub struct FrameOutput {
     /// Pages that the LOD lacks, the most urgent first; give them in a later frame's `arrived`.
     pub wanted: Vec<PageKey>,
     /// Pages that were evicted or refused; their memory can be used again.
-    pub evicted: Vec<Box<Page>>,
+    pub evicted: Vec<Arc<Page>>,
     /// Patch slots whose vertices were written in this frame: what a renderer must upload.
     pub built: Vec<u32>,
     /// Draws of each view, in the order of the input's views.

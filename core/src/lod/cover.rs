@@ -200,8 +200,9 @@ impl Planet<'_> {
                 self.cover.pages[id].into_iter().flatten().next().expect("a record has a side");
             let page = self.pages.get(page);
             let bound = page.bound_at(centre);
-            let height_m = f64::from(page.heights_m[page.sample_index(centre)]);
-            // Below a sea the interval shrinks to its surface, where the body's floor is.
+            // Without a survey a sea lies at the body's floor, to which the interval shrinks.
+            let at = page.sample_index(centre);
+            let height_m = f64::from(page.heights_m[at]) + page.sea_level_m(at);
             low_m = (height_m - f64::from(bound.variation_m)).max(floor_m);
             high_m = (height_m + f64::from(bound.variation_m)).max(floor_m);
             let is_even = level.is_multiple_of(2);

@@ -26,6 +26,8 @@ pub struct Block {
     vertices: Vec<PatchVertex>,
     /// Their lattice points.
     points: Vec<IVec3>,
+    /// Their heights above the ellipsoid, in metres.
+    surfaces_m: Vec<f64>,
     /// Body-fixed positions of one patch's vertices.
     places: Vec<DVec3>,
     built: [BuiltPatch; BLOCK],
@@ -40,6 +42,7 @@ impl Block {
         let block = || Self {
             vertices: vertices.clone(),
             points: points.clone(),
+            surfaces_m: vec![0.0; points.len()],
             places: places.clone(),
             built: [BuiltPatch::default(); BLOCK],
         };
@@ -81,16 +84,23 @@ pub fn build_block(ground: &Ground<'_>, patches: &Patches, slots: &[u32], block:
     }
     let tasks = || tasks.iter().flatten();
     let vertices = block.vertices.chunks_exact_mut(per_patch);
-    for (task, (vertices, points)) in
-        tasks().zip(vertices.zip(block.points.chunks_exact_mut(per_patch)))
+    let places = block.points.chunks_exact_mut(per_patch);
+    let surfaces_m = block.surfaces_m.chunks_exact_mut(per_patch);
+    for (task, (vertices, (points, surfaces_m))) in
+        tasks().zip(vertices.zip(places.zip(surfaces_m)))
     {
-        read_samples(task, patches.patch_depth, vertices, points);
+        read_samples(task, (patches.patch_depth, ground.sea), vertices, (points, surfaces_m));
     }
     let vertices = block.vertices.chunks_exact_mut(per_patch);
-    let targets = vertices.zip(block.points.chunks_exact(per_patch)).zip(&mut block.built);
-    for (task, ((vertices, points), built)) in tasks().zip(targets) {
-        for ((vertex, &point), place) in vertices.iter_mut().zip(points).zip(&mut block.places) {
-            *place = position(ground, vertex.height_m, point);
+    let places = block.points.chunks_exact(per_patch).zip(block.surfaces_m.chunks_exact(per_patch));
+    let targets = vertices.zip(places).zip(&mut block.built);
+    for (task, ((vertices, (points, surfaces_m)), built)) in tasks().zip(targets) {
+        let heights = points.iter().zip(surfaces_m);
+        for ((vertex, (&point, &surface_m)), place) in
+            vertices.iter_mut().zip(heights).zip(&mut block.places)
+        {
+            let normal = normal_of(point);
+            *place = ground.body.surface_from_normal(normal) + normal * surface_m;
             vertex.position = Ecef(*place).two_float();
         }
         *built = bound_and_hash(task.key, patches.patch_depth, vertices, &block.places);
@@ -107,31 +117,27 @@ fn task_of<'a>(ground: &Ground<'a>, patches: &Patches, slot: u32) -> Task<'a> {
     }
 }
 
-/// Lattice points of the vertices, and all of each vertex but its position.
+/// Lattice points of the vertices and their heights above the ellipsoid, and all of each vertex
+/// but its position.
 fn read_samples(
     task: &Task<'_>,
-    patch_depth: u8,
+    (patch_depth, sea): (u8, bool),
     vertices: &mut [PatchVertex],
-    points: &mut [IVec3],
+    (points, surfaces_m): (&mut [IVec3], &mut [f64]),
 ) {
     let [apex, start, end] = task.corners;
     let n = segments(patch_depth).cast_signed();
     let (to_start, to_end) = ((start - apex) / n, (end - apex) / n);
     let places = (0..=n).flat_map(|row| (0..=row).map(move |column| (row, column)));
-    for ((row, column), (vertex, point)) in places.zip(vertices.iter_mut().zip(points)) {
+    let targets = vertices.iter_mut().zip(points.iter_mut().zip(surfaces_m));
+    for ((row, column), (vertex, (point, surface_m))) in places.zip(targets) {
         *point = apex + to_start * (row - column) + to_end * column;
         let at = task.page.sample_index(*point);
         vertex.normal_oct = task.page.normals[at];
         vertex.layers = task.page.layers[at];
         vertex.height_m = task.page.heights_m[at];
+        *surface_m = task.page.surface_m(at, sea);
     }
-}
-
-fn position(ground: &Ground<'_>, height_m: f32, point: IVec3) -> DVec3 {
-    let normal = normal_of(point);
-    let ground_m = f64::from(height_m);
-    let height_m = if ground.sea && ground_m < 0.0 { 0.0 } else { ground_m };
-    ground.body.surface_from_normal(normal) + normal * height_m
 }
 
 /// Sphere and hash of a patch whose vertices lie at `places`, row by row from the apex.
