@@ -214,7 +214,7 @@ impl Overfly {
     /// Exact height of the ground above the ellipsoid at a place, in metres: a pure function of
     /// the scene and the place, whatever is loaded.
     pub fn ground_height_m(&self, at: Geodetic) -> f64 {
-        self.generator.planet().sample(at.normal()).height_m
+        self.generator.planet().map_or(0.0, |planet| planet.sample(at.normal()).height_m)
     }
 
     /// A bundled flight over this scene's body and ground: `rainier`, `descent` or `poles`.

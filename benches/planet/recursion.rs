@@ -30,9 +30,8 @@ pub struct Visit {
 impl Recursion {
     /// Over the meshes of a scene.
     pub fn new(scene: &SceneSettings) -> Self {
-        let height_range_m = Generator::new(scene).planet().height_range_m();
         Self {
-            horizon: Horizon::new(&scene.body, height_range_m, scene.sea),
+            horizon: Horizon::new(&scene.body, Generator::new(scene).surface_range_m()),
             scene: scene.clone(),
             stack: Vec::with_capacity(1024),
         }

@@ -19,6 +19,8 @@ pub use fault::{Fault, FaultKind, LoadError, SceneFaults};
 pub use overfly_core::settings::SceneSettings;
 
 use fields::Reader;
+use overfly_core::settings::{SourceSettings, is_address};
+use std::path::Path;
 
 /// A scene that is compiled in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -58,7 +60,8 @@ pub fn preset(name: &str) -> Option<&'static str> {
     Preset::named(name).map(Preset::text)
 }
 
-/// The settings of a scene file's text. `file` is only for the faults to name.
+/// The settings of a scene file's text. `file` is only for the faults to name. Paths of archives
+/// stay as they are written: relative to the current directory.
 ///
 /// Errors: every unknown, repeated or missing field, every wrong type and every value out of
 /// range, all at once; or where the text stops being RON.
@@ -82,6 +85,7 @@ pub fn read(text: &str, file: &str) -> Result<SceneSettings, SceneFaults> {
 /// The settings of a preset or of a scene file.
 ///
 /// - In: a name of [`PRESETS`], else a path; a file of such a name is reached as `./earth`.
+/// - Out: relative paths of archives lead on from the scene file's folder.
 /// - Errors: the file cannot be read, or has faults.
 pub fn load(name_or_path: &str) -> Result<SceneSettings, LoadError> {
     if let Some(text) = preset(name_or_path) {
@@ -91,7 +95,20 @@ pub fn load(name_or_path: &str) -> Result<SceneSettings, LoadError> {
         .map_err(|source| LoadError::Read { file: name_or_path.to_owned(), source })?;
     // Some editors begin a file with a byte order mark; RON does not know it.
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    read(text, name_or_path).map_err(LoadError::Faults)
+    let mut settings = read(text, name_or_path).map_err(LoadError::Faults)?;
+    let folder = Path::new(name_or_path).parent().unwrap_or(Path::new(""));
+    settings.sources.iter_mut().for_each(|source| lead_from(folder, source));
+    Ok(settings)
+}
+
+/// A relative path leads on from the folder; an absolute one replaces it.
+fn lead_from(folder: &Path, source: &mut SourceSettings) {
+    if let SourceSettings::Archive { location } = source
+        && !is_address(location)
+    {
+        let path = folder.join(&*location);
+        *location = path.into_os_string().into_string().expect("both parts are UTF-8");
+    }
 }
 
 /// A scene file's text. Devices and pipes, which may never end, are refused.

@@ -12,7 +12,7 @@ use overfly_core::datasource::procedural::Style;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::settings::{
     DepthSettings, LensSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings,
-    SunSettings,
+    SunSettings, is_address,
 };
 use overfly_core::units::{Pixels, Radians};
 
@@ -23,9 +23,9 @@ const SCENE: Shape = Shape {
 const BODIES: &[&str] = &["Wgs84", "Moon", "Mars", "Sphere", "Ellipsoid"];
 const SPHERE: Shape = Shape { name: "Sphere", fields: &["radius_m"] };
 const ELLIPSOID: Shape = Shape { name: "Ellipsoid", fields: &["a_m", "f"] };
-const SOURCES: &[&str] = &["Procedural"];
+const SOURCES: &[&str] = &["Archive", "Procedural"];
 const PROCEDURAL: Shape =
-    Shape { name: "Procedural", fields: &["seed", "style", "relief", "finest_m"] };
+    Shape { name: "Procedural", fields: &["seed", "style", "relief", "finest_m", "detail"] };
 const STYLES: &[&str] = &["Earthlike", "Cratered"];
 const SUN: Shape = Shape { name: "Sun", fields: &["latitude_deg", "longitude_deg"] };
 const LOD: Shape = Shape {
@@ -50,6 +50,9 @@ const MEMORY: Shape = Shape { name: "Memory", fields: &["pages_mib"] };
 /// The procedural planet is made for bodies of at least this radius.
 const RADIUS_M_MIN: f64 = 500.0;
 const RADIUS_M_MAX: f64 = 1e9;
+const ARCHIVES_MAX: usize = 8;
+/// No system takes longer paths, few servers longer addresses.
+const LOCATION_MAX: usize = 4096;
 const TRIANGLES_MAX: u32 = 16_000_000;
 /// A path of the lattice has so many levels, those inside a patch included.
 const LEVELS: u8 = 56;
@@ -137,32 +140,83 @@ fn plain<T>(reader: &mut Reader, node: &Node, path: &str, value: T) -> Option<T>
 }
 
 fn sources<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Vec<SourceSettings>> {
-    let Some(nodes) = reader.list(scene, "sources", "[Procedural(…)]") else {
+    let Some(nodes) = reader.list(scene, "sources", "[Archive(\"…\"), Procedural(…)]") else {
         let absent = Group::absent("sources[0]".into(), scene.at);
-        return Some(vec![source(reader, &absent)?]);
+        return Some(vec![procedural(reader, &absent)?]);
     };
     let mut sources = Vec::new();
     for (i, node) in nodes.iter().enumerate() {
         let path = format!("sources[{i}]");
-        if reader.variant(node, &path, SOURCES).is_some() {
-            let group = reader.group(node, &path, &PROCEDURAL);
-            sources.push(group.and_then(|group| source(reader, &group)));
+        match reader.variant(node, &path, SOURCES) {
+            Some("Archive") => {
+                if i == ARCHIVES_MAX {
+                    reader.out_of_range(node, &path, format!("at most {ARCHIVES_MAX} archives"));
+                }
+                sources.push(archive(reader, node, &path));
+            }
+            Some(_) => {
+                let group = reader.group(node, &path, &PROCEDURAL);
+                sources.push(group.and_then(|group| procedural(reader, &group)));
+                if i + 1 < nodes.len() {
+                    reader.out_of_range(
+                        node,
+                        &path,
+                        "a procedural source in the last place".into(),
+                    );
+                }
+            }
+            None => {}
         }
     }
-    counted(reader, scene, "sources", nodes.len(), [1, 1]);
+    counted(reader, scene, "sources", nodes.len(), [1, ARCHIVES_MAX + 1]);
     sources.into_iter().collect()
 }
 
-fn source<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<SourceSettings> {
+/// An archive's location, as it is written.
+fn archive(reader: &mut Reader, node: &Node, path: &str) -> Option<SourceSettings> {
+    let text = match &node.kind {
+        Kind::Tuple(_, items) if items.len() == 1 => &items[0],
+        _ => {
+            reader.wrong_type(node, path, "Archive(\"a path or an address\")");
+            return None;
+        }
+    };
+    let Kind::Text(location) = &text.kind else {
+        reader.wrong_type(text, path, "a text, the path or the address of an archive");
+        return None;
+    };
+    let sized = (1..=LOCATION_MAX).contains(&location.len());
+    if sized && !location.contains(char::is_control) && (is_address(location) || is_path(location))
+    {
+        return Some(SourceSettings::Archive { location: location.clone() });
+    }
+    let allowed = format!(
+        "a path or an address http://… or https://…, of 1 to {LOCATION_MAX} bytes, none of them \
+         a control character"
+    );
+    reader.out_of_range(text, path, allowed);
+    None
+}
+
+/// What does not begin like an address of whatever kind.
+fn is_path(location: &str) -> bool {
+    let word =
+        |scheme: &str| !scheme.is_empty() && scheme.bytes().all(|c| c.is_ascii_alphanumeric());
+    !location.split_once("://").is_some_and(|(scheme, _)| word(scheme))
+}
+
+fn procedural<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<SourceSettings> {
     let seed = reader.whole(source, "seed", 0..=u64::MAX, 2029);
     let style = style(reader, source);
     let relief = reader.number(source, "relief", 0.0..=10.0, 1.0);
     let finest_m = reader.number(source, "finest_m", 0.01..=1000.0, 0.15);
+    let detail = reader.number(source, "detail", 0.0..=10.0, 1.0);
     Some(SourceSettings::Procedural {
         seed: seed?,
         style: style?,
         relief: relief?,
         finest_m: finest_m?,
+        detail: detail?,
     })
 }
 

@@ -44,6 +44,7 @@ enum RawBody {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 enum RawSource {
+    Archive(String),
     Procedural {
         #[serde(default = "seed")]
         seed: i64,
@@ -53,6 +54,8 @@ enum RawSource {
         relief: f64,
         #[serde(default = "finest_m")]
         finest_m: f64,
+        #[serde(default = "one_f64")]
+        detail: f64,
     },
 }
 
@@ -120,8 +123,8 @@ fn earthlike() -> RawStyle {
 }
 
 fn one_source() -> Vec<RawSource> {
-    let (seed, relief, finest_m) = (seed(), one_f64(), finest_m());
-    vec![RawSource::Procedural { seed, style: earthlike(), relief, finest_m }]
+    let (seed, relief, finest_m, detail) = (seed(), one_f64(), finest_m(), one_f64());
+    vec![RawSource::Procedural { seed, style: earthlike(), relief, finest_m, detail }]
 }
 
 fn one_view() -> Vec<RawView> {
@@ -161,6 +164,19 @@ impl Default for RawMemory {
     }
 }
 
+fn source_line(source: &RawSource) -> String {
+    match source {
+        RawSource::Archive(location) => location.clone(),
+        RawSource::Procedural { seed, style, relief, finest_m, detail } => {
+            let style = match style {
+                RawStyle::Earthlike => Style::Earthlike,
+                RawStyle::Cratered => Style::Cratered,
+            };
+            format!("{seed} {style:?} {relief:?} {finest_m:?} {detail:?}")
+        }
+    }
+}
+
 /// What `ron` read, as our settings would list it; equal lists mean equal values.
 fn listing(raw: &RawScene) -> Vec<String> {
     let body = match raw.body {
@@ -175,13 +191,7 @@ fn listing(raw: &RawScene) -> Vec<String> {
         .as_ref()
         .map(|sun| Geodetic::from_degrees(sun.latitude_deg, sun.longitude_deg, 0.0).normal());
     let mut list = vec![format!("{body:?} {:?} {sun:?}", raw.sea)];
-    for RawSource::Procedural { seed, style, relief, finest_m } in &raw.sources {
-        let style = match style {
-            RawStyle::Earthlike => Style::Earthlike,
-            RawStyle::Cratered => Style::Cratered,
-        };
-        list.push(format!("{seed} {style:?} {relief:?} {finest_m:?}"));
-    }
+    list.extend(raw.sources.iter().map(source_line));
     let lod = &raw.lod;
     let counts = [lod.triangles_max, lod.patch_depth, lod.splits_max, lod.merges_max];
     list.push(format!("{:?} {counts:?} {} {}", lod.tolerance_px, lod.level_max, lod.wanted_max));
@@ -198,8 +208,13 @@ fn listing(raw: &RawScene) -> Vec<String> {
 fn listing_of(scene: &SceneSettings) -> Vec<String> {
     let sun = scene.sun.map(|sun| sun.direction);
     let mut list = vec![format!("{:?} {:?} {sun:?}", scene.body, scene.sea)];
-    for SourceSettings::Procedural { seed, style, relief, finest_m } in &scene.sources {
-        list.push(format!("{seed} {style:?} {relief:?} {finest_m:?}"));
+    for source in &scene.sources {
+        list.push(match source {
+            SourceSettings::Archive { location } => location.clone(),
+            SourceSettings::Procedural { seed, style, relief, finest_m, detail } => {
+                format!("{seed} {style:?} {relief:?} {finest_m:?} {detail:?}")
+            }
+        });
     }
     let lod = &scene.lod;
     let patch_depth = u32::from(lod.patch_depth);
@@ -245,7 +260,7 @@ fn agree(text: &str) -> bool {
 /// Small, and with every construct of the format.
 const SAMPLE: &str = r#"Scene(
     body: Ellipsoid(a_m: 6.4e6, f: -0.25), // the "body"
-    sources: [Procedural(seed: 0x1F, style: Cratered, relief: 1_0.0, finest_m: 2)],
+    sources: [Archive("a.b"), Procedural(seed: 0x1F, style: Cratered, finest_m: 2)],
     sea: true, /* nested /* one */ comment */
     sun: Some((latitude_deg: -10.5, longitude_deg: +60,)),
     lod: Lod(splits_max: 0b11, merges_max: 1_7),
@@ -284,6 +299,8 @@ fn both_take_every_way_of_writing_a_value() {
         ", views: [(name: \"tab\\tquote\\\"end\")]",
         ", views: [(name: \"two\nlines\")]",
         ", views: [(name: \"a\\\n    b\\\r\n c\")]",
+        ", sources: [Archive ( r#\"a\"# , ), Procedural(detail: 1_0)]",
+        ", sources: []",
         "// unclosed",
         "\u{200E}\u{85}\x0B ",
     ] {
@@ -336,6 +353,13 @@ fn both_refuse_what_is_broken() {
         ", depth: (splits_m: [,])",
         ", depth: (splits_m: (1, 2))",
         ", sources: [Procedural]",
+        ", sources: [Archive]",
+        ", sources: [Archive()]",
+        ", sources: [Archive(a: \"b\")]",
+        ", sources: [Archive((\"b\"))]",
+        ", sources: [Archive(\"a\", \"b\")]",
+        ", sources: [Archive(5)]",
+        ", sources: [Archive([])]",
         ", sources: [Procedural(1)]",
         ", sources: [procedural()]",
         "/ not a comment",

@@ -8,7 +8,7 @@
 use overfly_config::{FaultKind, LoadError, PRESETS, Preset, load, preset, read};
 use overfly_core::datasource::procedural::Style;
 use overfly_core::geodesy::Ellipsoid;
-use overfly_core::settings::{SceneSettings, SourceSettings};
+use overfly_core::settings::SceneSettings;
 
 fn settings(text: &str) -> SceneSettings {
     read(text, "scene.ron").unwrap_or_else(|faults| panic!("{faults}\nin {text}"))
@@ -43,8 +43,9 @@ fn presets_load_by_name() {
 fn earth_resolves_to_what_it_says() {
     let earth = load("earth").unwrap();
     assert_eq!(earth.body, Ellipsoid::WGS84);
-    let SourceSettings::Procedural { seed, style, relief, finest_m } = earth.sources[0];
-    assert_eq!((seed, style, relief, finest_m), (2029, Style::Earthlike, 1.0, 0.15));
+    let planet = earth.procedural_source().unwrap();
+    assert_eq!((planet.seed, planet.style), (2029, Style::Earthlike));
+    assert_eq!((planet.relief, planet.finest_m, earth.detail()), (1.0, 0.15, 1.0));
     assert_eq!(earth.sources.len(), 1);
     assert_eq!((earth.lod.tolerance.0, earth.lod.triangles_max), (1.0, 100_000));
     assert_eq!((earth.lod.patch_depth, earth.lod.level_max), (4, 50));
@@ -78,8 +79,7 @@ fn earth_spells_out_the_defaults() {
 fn moon_and_small_are_what_their_names_say() {
     let moon = load("moon").unwrap();
     assert_eq!((moon.body, moon.sea), (Ellipsoid::MOON, false));
-    let SourceSettings::Procedural { style, .. } = moon.sources[0];
-    assert_eq!(style, Style::Cratered);
+    assert_eq!(moon.procedural_source().unwrap().style, Style::Cratered);
     let small = load("small").unwrap();
     assert_eq!((small.body, small.sea), (Ellipsoid { a_m: 1000.0, f: 0.0 }, true));
     assert_eq!(small.depth.splits_m, [10.0, 300.0]);
@@ -133,8 +133,17 @@ fn each_range_ends_where_the_format_says() {
         ("sources: [Procedural(seed: -1)]", "2:28: sources[0].seed", "0 to 18446744073709551615"),
         ("sources: [Procedural(relief: 10.1)]", "2:30: sources[0].relief", "0 to 10"),
         ("sources: [Procedural(finest_m: 0)]", "2:32: sources[0].finest_m", "0.01 to 1000"),
-        ("sources: []", "2:10: sources", "is a list of 0, allowed is a list of 1"),
-        ("sources: [Procedural(), Procedural()]", "2:10: sources", "a list of 2"),
+        ("sources: [Procedural(detail: 10.5)]", "2:30: sources[0].detail", "0 to 10"),
+        ("sources: []", "2:10: sources", "is a list of 0, allowed is a list of 1 to 9"),
+        ("sources: [Procedural(), Procedural()]", "2:11: sources[0]", "in the last place"),
+        ("sources: [Procedural(), Archive(\"a\")]", "2:11: sources[0]", "in the last place"),
+        (
+            "sources: [Archive(\"\")]",
+            "2:19: sources[0]",
+            "is \"\", allowed is a path or an address",
+        ),
+        ("sources: [Archive(\"a\\nb\")]", "2:19: sources[0]", "control character"),
+        ("sources: [Archive(\"s3://a/b\")]", "2:19: sources[0]", "http://… or https://…"),
         ("sun: Some((latitude_deg: 91, longitude_deg: 0))", "2:26: sun.latitude_deg", "-90 to 90"),
         ("sun: Some((latitude_deg: 0, longitude_deg: 361))", "2:44: sun.longitude_deg", "-360"),
         ("lod: (tolerance_px: 0.001)", "2:21: lod.tolerance_px", "0.01 to 1000000"),
@@ -200,9 +209,14 @@ fn wrong_types_say_what_was_found_and_expected() {
         ),
         ("lod: (tolerance_px: [1])", "2:21: lod.tolerance_px: is a list, expected is a number"),
         ("lod: (patch_depth: (4))", "2:20: lod.patch_depth: is a tuple, expected is a whole"),
-        ("sources: Procedural()", "2:10: sources: is Procedural(…), expected is [Procedural(…)]"),
+        ("sources: Procedural()", "2:10: sources: is Procedural(…), expected is [Archive(\"…\"), "),
+        ("sources: [Archive]", "2:11: sources[0]: is Archive, expected is Archive(\"a path or"),
+        ("sources: [Archive()]", "2:11: sources[0]: is Archive(…), expected is Archive(\"a path"),
+        ("sources: [Archive(\"a\", \"b\")]", "2:11: sources[0]: is Archive(…), expected is"),
+        ("sources: [Archive(path: \"a\")]", "2:11: sources[0]: is Archive(…), expected is"),
+        ("sources: [Archive(7)]", "2:19: sources[0]: is the number 7, expected is a text"),
         ("sources: [Procedural]", "2:11: sources[0]: is Procedural, expected is Procedural(seed"),
-        ("sources: [3]", "2:11: sources[0]: is the number 3, expected is one of Procedural"),
+        ("sources: [3]", "2:11: sources[0]: is the number 3, expected is one of Archive, Pro"),
         ("sources: [Procedural(style: Earthlike())]", "2:29: sources[0].style: is Earthlike(…)"),
         ("sun: (latitude_deg: 1)", "2:6: sun: is a struct, expected is None or Some(("),
         ("sun: Some(1)", "2:11: sun: is the number 1, expected is Sun(latitude_deg"),
@@ -360,4 +374,49 @@ fn files_load_and_missing_ones_say_which() {
     let sentence = missing.to_string();
     assert!(sentence.starts_with("cannot read scene no/such/scene.ron: "), "{sentence}");
     assert!(sentence.ends_with("(the presets are earth, moon, small)"), "{sentence}");
+}
+
+fn archives(scene: &SceneSettings) -> Vec<&str> {
+    scene.archives().collect()
+}
+
+#[test]
+fn archives_come_finest_first_and_the_planet_beneath() {
+    let scene = settings(
+        "(body: Wgs84, sources: [Archive(\"alps.pmtiles\"), \
+         Archive(r\"http://host/planet.pmtiles\",), Procedural(seed: 7, detail: 0)])",
+    );
+    assert_eq!(archives(&scene), ["alps.pmtiles", "http://host/planet.pmtiles"]);
+    assert_eq!((scene.procedural_source().unwrap().seed, scene.detail()), (7, 0.0));
+    assert_eq!(scene.sources.len(), 3);
+    let alone = settings("(body: Wgs84, sources: [Archive(\"alps.pmtiles\")])");
+    assert_eq!((archives(&alone).len(), alone.procedural_source()), (1, None));
+}
+
+#[test]
+fn eight_archives_and_a_planet_are_the_most() {
+    let of =
+        |archives: usize| format!("sources: [{}Procedural()]", "Archive(\"a\"), ".repeat(archives));
+    assert_eq!(archives(&settings(&format!("(body: Moon, {})", of(8)))).len(), 8);
+    let report = report_of(&of(9));
+    assert!(report.contains("sources: is a list of 10, allowed is a list of 1 to 9"), "{report}");
+    let without = report_of(&of(9).replace(", Procedural()", ""));
+    assert_eq!(without.lines().count(), 1, "{without}");
+    assert!(without.contains("sources[8]: is Archive(\"a\"), allowed is at most 8 archives"));
+}
+
+#[test]
+fn relative_paths_of_archives_lead_on_from_the_scene_file() {
+    let text = "(body: Moon, sources: [Archive(\"a.pmtiles\"), Archive(\"../b.pmtiles\"), \
+                Archive(\"/c.pmtiles\"), Archive(\"HTTP://d/e\")])";
+    let written = ["a.pmtiles", "../b.pmtiles", "/c.pmtiles", "HTTP://d/e"];
+    assert_eq!(archives(&settings(text)), written);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.ron");
+    std::fs::write(&path, text).unwrap();
+    let scene = load(path.to_str().unwrap()).unwrap();
+    let inside = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (a, b) = (inside("a.pmtiles"), inside("../b.pmtiles"));
+    assert_eq!(archives(&scene), [&a, &b, "/c.pmtiles", "HTTP://d/e"]);
+    assert_eq!(scene.digest(), settings(text).digest(), "the folder is not part of the scene");
 }

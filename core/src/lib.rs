@@ -37,6 +37,8 @@ pub mod lod;
 
 pub mod mesh;
 
+pub mod ground;
+
 pub mod frame;
 
 pub mod digest;

@@ -6,6 +6,7 @@
 //! Not here: the settings' own ranges (`overfly_config` checks those).
 
 use crate::datasource::Page;
+use crate::datasource::page::Survey;
 use crate::settings::SceneSettings;
 
 /// The base octahedron's triangles.
@@ -38,7 +39,8 @@ impl Limits {
         assert!(lod.triangles_max >> lod.patch_depth >= BASE_LEAVES, "triangle budget");
         let splits = ((lod.triangles_max >> lod.patch_depth) - BASE_LEAVES) / 2;
         let leaves = BASE_LEAVES + 2 * splits;
-        let pages = settings.memory.pages_bytes / size_of::<Page>() as u64;
+        let survey = if settings.archives().next().is_some() { size_of::<Survey>() } else { 0 };
+        let pages = settings.memory.pages_bytes / (size_of::<Page>() + survey) as u64;
         let built = 8_u64 * u64::from(lod.splits_max) + 2 * u64::from(lod.merges_max) + 8;
         Self {
             leaves,

@@ -16,7 +16,7 @@ use glam::DVec3;
 pub struct SceneSettings {
     /// Shape of the body.
     pub body: Ellipsoid,
-    /// Where heights come from, finest first. One procedural source, for now.
+    /// Where heights come from, finest first: archives, then at most one procedural source.
     pub sources: Vec<SourceSettings>,
     /// Level of detail.
     pub lod: LodSettings,
@@ -33,8 +33,13 @@ pub struct SceneSettings {
 }
 
 /// One source of heights.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum SourceSettings {
+    /// Real elevation, in a file or on a server.
+    Archive {
+        /// Path of the file, or an address as [`is_address`] knows it.
+        location: String,
+    },
     /// The procedural planet: no files.
     Procedural {
         /// Which planet of all.
@@ -45,6 +50,8 @@ pub enum SourceSettings {
         relief: f64,
         /// Shortest wavelength of the ground in metres.
         finest_m: f64,
+        /// Strength of the detail below the last level of archives, 0 to 10; 0 is none.
+        detail: f64,
     },
 }
 
@@ -103,24 +110,73 @@ pub struct SunSettings {
     pub direction: DVec3,
 }
 
+/// Whether an archive's location is an address on a server; all others are paths.
+pub fn is_address(location: &str) -> bool {
+    ["http://", "https://"].into_iter().any(|scheme| {
+        location.get(..scheme.len()).is_some_and(|start| start.eq_ignore_ascii_case(scheme))
+    })
+}
+
 impl SourceSettings {
-    /// What the procedural planet of this source is made from, on `body`.
-    pub fn procedural(&self, body: &Ellipsoid) -> ProceduralSettings {
-        let Self::Procedural { seed, style, relief, finest_m } = *self;
-        let radius_m = (2.0 * body.a_m + body.b_m()) / 3.0;
-        ProceduralSettings { seed, radius_m, style, relief, finest_m }
+    /// As recordings list it. An archive of the same name in another folder is the same; `detail`
+    /// counts only beside archives, and scenes without any keep the text they always had.
+    fn listed(&self, beside_archives: bool) -> String {
+        match self {
+            Self::Archive { location } if is_address(location) => format!("Archive({location:?})"),
+            Self::Archive { location } => {
+                let name = location.rsplit(['/', '\\']).next().unwrap_or(location);
+                format!("Archive({name:?})")
+            }
+            Self::Procedural { seed, style, relief, finest_m, detail } => {
+                let detail =
+                    if beside_archives { format!(", detail: {detail:?}") } else { String::new() };
+                format!(
+                    "Procedural {{ seed: {seed}, style: {style:?}, relief: {relief:?}, \
+                     finest_m: {finest_m:?}{detail} }}"
+                )
+            }
+        }
     }
 }
 
 impl SceneSettings {
+    /// Locations of the archives, finest first.
+    pub fn archives(&self) -> impl Iterator<Item = &str> {
+        self.sources.iter().filter_map(|source| match source {
+            SourceSettings::Archive { location } => Some(location.as_str()),
+            SourceSettings::Procedural { .. } => None,
+        })
+    }
+
+    /// What the procedural planet of this scene is made from; `None` where there is none.
+    pub fn procedural_source(&self) -> Option<ProceduralSettings> {
+        self.sources.iter().find_map(|source| match *source {
+            SourceSettings::Archive { .. } => None,
+            SourceSettings::Procedural { seed, style, relief, finest_m, .. } => {
+                let radius_m = (2.0 * self.body.a_m + self.body.b_m()) / 3.0;
+                Some(ProceduralSettings { seed, radius_m, style, relief, finest_m })
+            }
+        })
+    }
+
+    /// Strength of the procedural detail below the last level of archives; 0 is none.
+    pub fn detail(&self) -> f64 {
+        let detail = self.sources.iter().find_map(|source| match *source {
+            SourceSettings::Archive { .. } => None,
+            SourceSettings::Procedural { detail, .. } => Some(detail),
+        });
+        detail.unwrap_or(0.0)
+    }
+
     /// Every setting that can change a frame's bits, as (path, value), in a fixed order.
     pub fn listing(&self) -> Vec<(String, String)> {
         let mut list = vec![
             ("body.a_m".into(), format!("{:?}", self.body.a_m)),
             ("body.f".into(), format!("{:?}", self.body.f)),
         ];
+        let beside_archives = self.archives().next().is_some();
         for (i, source) in self.sources.iter().enumerate() {
-            list.push((format!("sources[{i}]"), format!("{source:?}")));
+            list.push((format!("sources[{i}]"), source.listed(beside_archives)));
         }
         let lod = &self.lod;
         for (name, value) in [
@@ -152,5 +208,83 @@ impl SceneSettings {
             }
         }
         chain.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLANET: SourceSettings = SourceSettings::Procedural {
+        seed: 2029,
+        style: Style::Cratered,
+        relief: 1.0,
+        finest_m: 0.15,
+        detail: 0.5,
+    };
+    const PLANET_TEXT: &str =
+        "Procedural { seed: 2029, style: Cratered, relief: 1.0, finest_m: 0.15 }";
+
+    fn scene(sources: Vec<SourceSettings>) -> SceneSettings {
+        SceneSettings {
+            body: Ellipsoid::WGS84,
+            sources,
+            lod: LodSettings {
+                tolerance: Pixels(1.0),
+                triangles_max: 1000,
+                patch_depth: 4,
+                splits_max: 1,
+                merges_max: 1,
+                level_max: 40,
+                wanted_max: 1,
+            },
+            views: Vec::new(),
+            depth: DepthSettings { splits_m: Vec::new() },
+            memory: MemorySettings { pages_bytes: 1 << 20 },
+            sea: false,
+            sun: None,
+        }
+    }
+
+    fn archive(location: &str) -> SourceSettings {
+        SourceSettings::Archive { location: location.into() }
+    }
+
+    fn listed(scene: &SceneSettings) -> Vec<String> {
+        let sources = |(path, _): &(String, String)| path.starts_with("sources");
+        scene.listing().into_iter().filter(sources).map(|(_, value)| value).collect()
+    }
+
+    #[test]
+    fn scenes_without_archives_are_listed_as_they_always_were() {
+        let scene = scene(vec![PLANET]);
+        assert_eq!(listed(&scene), [PLANET_TEXT]);
+        assert_eq!(scene.archives().count(), 0);
+        assert_eq!(scene.procedural_source().unwrap().seed, 2029);
+    }
+
+    #[test]
+    fn archives_are_listed_by_name_wherever_they_lie() {
+        let here = scene(vec![archive("a/alps.pmtiles"), archive("http://h/p.pmtiles"), PLANET]);
+        let there =
+            scene(vec![archive("C:\\b\\alps.pmtiles"), archive("http://h/p.pmtiles"), PLANET]);
+        assert_eq!(here.digest(), there.digest());
+        let planet = PLANET_TEXT.replace(" }", ", detail: 0.5 }");
+        let expected = ["Archive(\"alps.pmtiles\")", "Archive(\"http://h/p.pmtiles\")", &planet];
+        assert_eq!(listed(&here), expected);
+        assert_eq!(here.archives().collect::<Vec<_>>(), ["a/alps.pmtiles", "http://h/p.pmtiles"]);
+        assert_eq!(here.detail(), 0.5);
+    }
+
+    #[test]
+    fn archives_alone_have_neither_planet_nor_detail() {
+        let scene = scene(vec![archive("alps.pmtiles")]);
+        assert_eq!((scene.procedural_source(), scene.detail()), (None, 0.0));
+    }
+
+    #[test]
+    fn only_http_and_https_are_addresses() {
+        assert!(is_address("http://a") && is_address("HTTPS://a"));
+        assert!(["", "é", "ftp://a", "a/http://b"].into_iter().all(|path| !is_address(path)));
     }
 }

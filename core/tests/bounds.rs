@@ -52,7 +52,7 @@ fn worst_ratio(rig: &Rig, body: &Ellipsoid, sea: bool) -> (f64, u32) {
         let seed = record.key() ^ u64::from(slot) << 40 ^ points;
         let there =
             body.geodetic_from_ecef(Ecef(point_of(patches.vertices_of(slot), &pattern, seed)));
-        let ground_m = rig.generator.planet().sample(there.normal()).height_m;
+        let ground_m = rig.generator.planet().unwrap().sample(there.normal()).height_m;
         let ground_m = if sea { ground_m.max(0.0) } else { ground_m };
         worst = worst.max((there.height_m - ground_m).abs() / region.error_m);
         points += 1;
@@ -69,8 +69,9 @@ fn no_triangle_is_farther_from_the_ground_than_its_bound() {
     for ((style, sea), patch_depth) in kinds.into_iter().flat_map(|kind| [(kind, 0), (kind, 4)]) {
         let mut settings = scene(patch_depth, 60_000);
         settings.sea = sea;
-        let (seed, relief, finest_m) = (2029, 1.0, 0.2);
-        settings.sources = vec![SourceSettings::Procedural { seed, style, relief, finest_m }];
+        let (seed, relief, finest_m, detail) = (2029, 1.0, 0.2, 1.0);
+        settings.sources =
+            vec![SourceSettings::Procedural { seed, style, relief, finest_m, detail }];
         let body = settings.body;
         let mut rig = Rig::new(&settings, 1);
         let mut worst = 0.0_f64;
@@ -103,7 +104,7 @@ fn patches_hold_the_heights_of_their_lattice_points() {
             let points = lattice_points(shape.triangle(side), 4);
             for (point, vertex) in points.into_iter().zip(patches.vertices_of(slot)).step_by(7) {
                 let normal = overfly_core::lattice::normal_of(point);
-                let height_m = rig.generator.planet().sample(normal).height_m;
+                let height_m = rig.generator.planet().unwrap().sample(normal).height_m;
                 assert!((f64::from(vertex.height_m) - height_m).abs() < 1e-3);
                 checked += 1;
             }

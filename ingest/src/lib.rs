@@ -5,3 +5,6 @@
 //! Keeps: nothing.
 //! Not here: reading archives (`overfly_archive`), making pages from tiles (`overfly_core`).
 #![forbid(unsafe_code)]
+
+pub mod geoid;
+pub mod raster;

@@ -34,6 +34,7 @@ fn scene() -> SceneSettings {
             style: Style::Earthlike,
             relief: 1.0,
             finest_m: 0.2,
+            detail: 1.0,
         }],
         lod: LodSettings {
             tolerance: Pixels(1.0),

@@ -1,13 +1,17 @@
-//! Makes the pages of the procedural planet: on the host's threads, never in a frame.
+//! Makes the pages of a scene: on the host's threads, never in a frame.
 //!
-//! In:    a page key; the planet, the body, the patch depth.
+//! In:    a page key and the tiles it needs; the scene's ground, the body, the patch depth.
 //! Out:   a [`Page`]. A pure function of these: any thread, any order, same bits.
-//! Keeps: nothing but the immutable planet.
-//! Not here: the planet's heights (`procedural`).
+//! Keeps: nothing but the immutable ground.
+//! Not here: heights (`compose`, `procedural`), fetching tiles (the host's loader).
 
+use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m};
+use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
-use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Page, SAMPLES};
-use super::procedural::{Planet, Sample};
+use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
+use super::procedural::detail::Detail;
+use super::procedural::{Planet, Style};
+use super::tile::Tile;
 use crate::digest::Chain;
 use crate::geodesy::{Ellipsoid, narrow};
 use crate::lattice::{cross_of, normal_of, signs, unfold};
@@ -18,31 +22,92 @@ use std::sync::Arc;
 
 /// Everything that the pages of one scene are made from.
 pub struct Generator {
-    planet: Planet,
+    bed: Bed,
     body: Ellipsoid,
     patch_depth: u8,
     sea: bool,
 }
 
+/// Sine of the slope that is half rock, as far as steepness goes.
+const STEEP: f64 = 0.4;
+
 impl Generator {
-    /// The generator of a scene's first source.
+    /// The generator of a scene without archives.
     pub fn new(settings: &SceneSettings) -> Self {
-        let source = settings.sources.first().expect("a scene has a source");
+        Self::with_archives(settings, Vec::new())
+    }
+
+    /// The generator of a scene, with the facts of its archives in the scene's order.
+    pub fn with_archives(settings: &SceneSettings, archives: Vec<ArchiveFacts>) -> Self {
+        let source = settings.procedural_source();
+        let style = if settings.sea { Style::Earthlike } else { Style::Cratered };
         Self {
-            planet: Planet::new(&source.procedural(&settings.body)),
+            bed: Bed {
+                planet: source.map(|source| Planet::new(&source)),
+                detail: source
+                    .filter(|_| !archives.is_empty())
+                    .map(|source| Detail::new(&source, settings.detail())),
+                archives,
+                body: settings.body,
+                style: source.map_or(style, |source| source.style),
+            },
             body: settings.body,
             patch_depth: settings.lod.patch_depth,
             sea: settings.sea,
         }
     }
 
-    /// The planet itself, for exact heights without pages.
-    pub fn planet(&self) -> &Planet {
-        &self.planet
+    /// The procedural planet, if the scene has one.
+    pub fn planet(&self) -> Option<&Planet> {
+        self.bed.planet.as_ref()
     }
 
-    /// Makes one page.
+    /// Facts of the archives, in the scene's order.
+    pub fn archives(&self) -> &[ArchiveFacts] {
+        &self.bed.archives
+    }
+
+    /// Least and greatest height of the drawn surface above the ellipsoid, anywhere, in metres.
+    pub fn surface_range_m(&self) -> [f64; 2] {
+        self.bed.surface_range_m(self.sea)
+    }
+
+    /// The tiles that a page is made from, its neighbours' included: normals at its border are
+    /// those of the ground on both sides. Empty in scenes without archives.
+    pub fn needs(&self, key: PageKey) -> Vec<Need> {
+        if self.bed.is_procedural() {
+            return Vec::new();
+        }
+        let mut keys = vec![key];
+        let last = PAGE_SIDE - 1;
+        let middle = last / 2;
+        for (i, j) in
+            [0, middle, last].into_iter().flat_map(|j| [0, middle, last].map(move |i| (i, j)))
+        {
+            let arms = cross_of(key.sample(i, j), key.step());
+            let outside = arms.into_iter().filter(|&arm| place_within(key, arm).is_none());
+            keys.extend(outside.map(|arm| cell_of(arm, key.depth())));
+        }
+        self.bed.needs(&keys, self.coarser())
+    }
+
+    /// Makes one page of a scene without archives.
     pub fn page(&self, key: PageKey) -> Arc<Page> {
+        self.page_from(key, &[])
+    }
+
+    /// Makes one page; `tiles` are what [`Self::needs`] asked for, in its order.
+    ///
+    /// # Panics
+    /// If there are fewer or more tiles.
+    pub fn page_from(&self, key: PageKey, tiles: &[Option<Arc<Tile>>]) -> Arc<Page> {
+        let needs = self.needs(key);
+        assert_eq!(needs.len(), tiles.len(), "a tile, or none, for every need");
+        let survey = Survey {
+            sea_level_m: [0.0; SAMPLES],
+            sea_level_variation_m: 0.0,
+            origin: [Origin::Procedural; SAMPLES],
+        };
         let mut page = Box::new(Page {
             key,
             heights_m: [0.0; SAMPLES],
@@ -50,34 +115,45 @@ impl Generator {
             layers: [[0; 4]; SAMPLES],
             bounds: [Bound::default(); BOUND_SIDE * BOUND_SIDE],
             height_range_m: [f32::MAX, f32::MIN],
-            survey: None,
+            survey: (!self.bed.is_procedural()).then(|| Box::new(survey)),
             content: 0,
         });
-        self.fill_samples(&mut page);
-        self.fill_normals(&mut page);
+        let mut plots = Plots::new(&self.bed, &needs, tiles);
+        self.fill_samples(&mut page, &mut plots);
+        self.fill_normals(&mut page, &mut plots);
         page.content = content_of(&page);
         Arc::from(page)
     }
 
-    fn fill_samples(&self, page: &mut Page) {
+    /// Marks hold for patches of depth 4; deeper ones reach farther, as from coarser tiles.
+    fn coarser(&self) -> u8 {
+        self.patch_depth.saturating_sub(4) / 2
+    }
+
+    fn fill_samples(&self, page: &mut Page, plots: &mut Plots<'_>) {
         for (i, j) in places() {
             let point = page.key.sample(i, j);
-            let sample = self.planet.sample(normal_of(point));
+            let ground = plots.ground(point);
             let at = j * PAGE_SIDE + i;
-            page.heights_m[at] = narrow(sample.height_m);
-            let layers = sample.layers;
+            page.heights_m[at] = narrow(ground.height_m);
+            let layers = ground.layers;
             page.layers[at] = [layers.roughness, layers.rock, layers.moisture, layers.temperature];
+            if let Some(survey) = &mut page.survey {
+                survey.sea_level_m[at] = narrow(ground.sea_level_m);
+                survey.origin[at] = ground.origin;
+            }
             let [low, high] = page.height_range_m;
             page.height_range_m = [low.min(page.heights_m[at]), high.max(page.heights_m[at])];
             if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
-                let bound = self.bound(page.key, point, &sample);
-                page.bounds[j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE] = bound;
+                let place = j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE;
+                page.bounds[place] = self.bound(page, point, &ground, plots);
             }
         }
     }
 
     /// The bounds around a sample, over all that a diamond near it and its descendants can reach.
-    fn bound(&self, key: PageKey, point: IVec3, sample: &Sample) -> Bound {
+    fn bound(&self, page: &mut Page, point: IVec3, ground: &Ground, plots: &Plots<'_>) -> Bound {
+        let key = page.key;
         let step = f64::from(key.step());
         let leaf_side = step * f64::from(1_u32 << (self.patch_depth / 2));
         let stride = DIAGONAL * step * 4.0;
@@ -85,63 +161,115 @@ impl Generator {
         let norm = (point.as_dvec3().length() - reach).max(NORM_MIN);
         let [curvature_min, curvature_max] = self.body.curvature_radii_m();
         let metres = |lattice: f64| lattice / norm * curvature_max;
-        let slope = self.planet.ruggedness_slope_per_m();
-        let ruggedness = (sample.ruggedness + slope * metres(reach)).min(1.0);
-        let variation_m = self.planet.variation_m(metres(reach), ruggedness);
-        let drowned = self.sea && sample.height_m + variation_m < 0.0;
-        let shore = self.sea && !drowned && sample.height_m - variation_m < 0.0;
-        let error = |edge: f64| {
-            let edge_m = metres(edge * step);
-            let sagitta_m = edge_m * edge_m / (8.0 * curvature_min);
-            let ground_m = if drowned { 0.0 } else { self.planet.residual_m(edge_m, ruggedness) };
-            // Where water meets land, an edge that rises by d cuts the corner by d/4 at most.
-            let corner_m =
-                if shore { self.planet.variation_m(edge_m, ruggedness) / 4.0 } else { 0.0 };
-            narrow(ground_m + corner_m + sagitta_m)
+        let edges_m = edges(self.patch_depth).map(|edge| metres(edge * step));
+        let scope = Scope { reach_m: metres(reach), reach_steps: reach / step, edges_m };
+        let sagitta_m = edges_m.map(|edge_m| edge_m * edge_m / (8.0 * curvature_min));
+        if self.bed.is_procedural() {
+            return self.bound_of_planet(&scope, sagitta_m, ground);
+        }
+        let doubt = plots.doubt(key, point, &scope, self.coarser());
+        let [low_m, high_m] = doubt.range_m;
+        let variation_m = (high_m - ground.height_m).max(ground.height_m - low_m).max(0.0);
+        let error = |level: usize| {
+            let [geoid_m, _] = geoid_doubt_m(&self.bed, edges_m[level], 0.0);
+            let relief_m = self.drawn(ground.height_m, variation_m, |shore| {
+                doubt.error_m[level] + if shore { (high_m - low_m) / 4.0 } else { 0.0 }
+            });
+            narrow(relief_m + geoid_m + sagitta_m[level])
         };
-        let [odd, even] = edges(self.patch_depth);
+        let [_, sea_level_m] = geoid_doubt_m(&self.bed, 0.0, scope.reach_m);
+        if let Some(survey) = &mut page.survey {
+            let widest_m = survey.sea_level_variation_m.max(narrow(sea_level_m));
+            survey.sea_level_variation_m = widest_m;
+        }
         Bound {
-            error_odd_m: error(odd),
-            error_even_m: error(even),
-            variation_m: narrow(variation_m),
+            error_odd_m: error(0),
+            error_even_m: error(1),
+            variation_m: narrow(variation_m * ROUNDING + 1e-3),
         }
     }
 
-    /// Normals by central differences over the lattice cross, whichever page its arms lie in.
-    fn fill_normals(&self, page: &mut Page) {
+    fn bound_of_planet(&self, scope: &Scope, sagitta_m: [f64; 2], ground: &Ground) -> Bound {
+        let planet = self.bed.planet.as_ref().expect("a scene without archives has a planet");
+        let slope = planet.ruggedness_slope_per_m();
+        let ruggedness = (ground.ruggedness + slope * scope.reach_m).min(1.0);
+        let variation_m = planet.variation_m(scope.reach_m, ruggedness);
+        let error = |level: usize| {
+            let edge_m = scope.edges_m[level];
+            // Where water meets land, an edge that rises by d cuts the corner by d/4 at most.
+            let relief_m = self.drawn(ground.height_m, variation_m, |shore| {
+                let corner_m =
+                    if shore { planet.variation_m(edge_m, ruggedness) / 4.0 } else { 0.0 };
+                planet.residual_m(edge_m, ruggedness) + corner_m
+            });
+            narrow(relief_m + sagitta_m[level])
+        };
+        Bound { error_odd_m: error(0), error_even_m: error(1), variation_m: narrow(variation_m) }
+    }
+
+    /// The error of what is drawn: none under water, that of a shore where ground and sea level
+    /// meet within reach, else that of the ground.
+    fn drawn(&self, height_m: f64, variation_m: f64, error_m: impl Fn(bool) -> f64) -> f64 {
+        let drowned = self.sea && height_m + variation_m < 0.0;
+        let shore = self.sea && !drowned && height_m - variation_m < 0.0;
+        if drowned { 0.0 } else { error_m(shore) }
+    }
+
+    /// Normals by central differences over the lattice cross, whichever page its arms lie in; and
+    /// the rock that shows where real ground is steep.
+    fn fill_normals(&self, page: &mut Page, plots: &mut Plots<'_>) {
         for (i, j) in places() {
             let point = page.key.sample(i, j);
             let arms = cross_of(point, page.key.step());
-            let [a, b, c, d] = arms.map(|arm| self.position(page, arm));
+            let [a, b, c, d] = arms.map(|arm| self.position(page, plots, arm));
             let normal = (a - c).cross(b - d).normalize();
-            let inward = normal.dot(normal_of(point)) < 0.0;
-            page.normals[j * PAGE_SIDE + i] = encode(if inward { -normal } else { normal });
+            let up = normal_of(point);
+            let inward = normal.dot(up) < 0.0;
+            let normal = if inward { -normal } else { normal };
+            let at = j * PAGE_SIDE + i;
+            page.normals[at] = encode(normal);
+            if page.survey.as_ref().is_some_and(|s| s.origin[at] != Origin::Procedural) {
+                let flat = normal.dot(up);
+                let steep = (1.0 - flat * flat).max(0.0);
+                let share = steep / (steep + STEEP * STEEP);
+                let rock = f64::from(page.layers[at][1]) + 0.9 * 255.0 * share;
+                page.layers[at][1] = (rock.min(255.0).round() as u32 & 0xFF) as u8;
+            }
         }
     }
 
-    fn position(&self, page: &Page, point: IVec3) -> DVec3 {
+    fn position(&self, page: &Page, plots: &mut Plots<'_>, point: IVec3) -> DVec3 {
         let normal = normal_of(point);
-        let height_m = sample_within(page, point)
-            .unwrap_or_else(|| narrow(self.planet.sample(normal).height_m));
-        self.body.surface_from_normal(normal) + normal * f64::from(height_m)
+        let height_m = match place_within(page.key, point) {
+            Some(at) => f64::from(page.heights_m[at]) + page.sea_level_m(at),
+            None => {
+                let ground = plots.ground(point);
+                f64::from(narrow(ground.height_m)) + f64::from(narrow(ground.sea_level_m))
+            }
+        };
+        self.body.surface_from_normal(normal) + normal * height_m
     }
 }
+
+/// Rounding of bounds through f32, many times over.
+const ROUNDING: f64 = 1.0 + 1e-6;
 
 /// Column and row of every sample, row by row.
 fn places() -> impl Iterator<Item = (usize, usize)> {
     (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (i, j)))
 }
 
-/// The height at a lattice point if it is a sample of this page.
-fn sample_within(page: &Page, point: IVec3) -> Option<f32> {
-    let (sx, sy) = signs(page.key.quadrant());
+/// Index of the sample at a lattice point, if it is one of the page `key`.
+fn place_within(key: PageKey, point: IVec3) -> Option<usize> {
+    let (sx, sy) = signs(key.quadrant());
     if sx * point.x < 0 || sy * point.y < 0 {
         return None;
     }
-    let (u, v) = unfold(page.key.quadrant(), point);
-    let (u0, v0) = page.key.origin();
-    let inside = |along: i32| (0..=page.key.side()).contains(&along);
-    (inside(u - u0) && inside(v - v0)).then(|| page.heights_m[page.sample_index(point)])
+    let (u, v) = unfold(key.quadrant(), point);
+    let (u0, v0) = key.origin();
+    let inside = |along: i32| (0..=key.side()).contains(&along);
+    let place = |along: i32| usize::try_from(along / key.step()).expect("inside the page");
+    (inside(u - u0) && inside(v - v0)).then(|| place(v - v0) * PAGE_SIDE + place(u - u0))
 }
 
 /// A unit vector in octahedral encoding, ±32767 is ±1. Error: 4e-5 rad.
@@ -164,6 +292,11 @@ fn content_of(page: &Page) -> u64 {
         let layers = u64::from(u32::from_le_bytes(page.layers[at]));
         chain.add(u64::from(page.heights_m[at].to_bits()) << 32 | a << 16 | b);
         chain.add(layers);
+    }
+    if let Some(survey) = &page.survey {
+        chain.add(u64::from(survey.sea_level_variation_m.to_bits()));
+        let samples = survey.sea_level_m.iter().zip(&survey.origin);
+        samples.for_each(|(m, &origin)| chain.add(u64::from(m.to_bits()) << 8 | origin as u64));
     }
     for bound in &page.bounds {
         let bits = [bound.error_odd_m, bound.error_even_m, bound.variation_m].map(f32::to_bits);

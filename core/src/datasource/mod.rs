@@ -5,12 +5,17 @@
 //! Keeps: the page pool.
 //! Not here: files and threads (the host's loader).
 
+pub mod codec;
+pub mod coder;
+pub mod compose;
+pub mod facts;
 pub mod generate;
 pub mod key;
 pub mod page;
 pub mod pages;
 
 pub mod procedural;
+pub mod tile;
 
 pub use key::{PAGE_SIDE, PageKey};
 pub use page::Page;

@@ -58,6 +58,9 @@ pub enum Origin {
 pub struct Survey {
     /// Height of sea level above the ellipsoid at each sample: the geoid's undulation in metres.
     pub sea_level_m: [f32; SAMPLES],
+    /// Bound on the difference of sea level to any place that a descendant of a diamond drawn from
+    /// this page can reach. Metres.
+    pub sea_level_variation_m: f32,
     /// Where each sample comes from.
     pub origin: [Origin; SAMPLES],
 }
@@ -97,6 +100,11 @@ impl Page {
     /// Sea level above the ellipsoid at sample `at`, in metres.
     pub fn sea_level_m(&self, at: usize) -> f64 {
         self.survey.as_ref().map_or(0.0, |survey| f64::from(survey.sea_level_m[at]))
+    }
+
+    /// Bound on how much sea level differs within reach of this page's diamonds, in metres.
+    pub fn sea_level_variation_m(&self) -> f64 {
+        self.survey.as_ref().map_or(0.0, |survey| f64::from(survey.sea_level_variation_m))
     }
 
     /// Height of the drawn surface above the ellipsoid at sample `at`, in metres: the ground, or

@@ -10,6 +10,7 @@ use glam::DVec3;
 mod bounds;
 mod cratered;
 mod craters;
+pub mod detail;
 mod earthlike;
 mod noise;
 mod outline;

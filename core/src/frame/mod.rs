@@ -76,11 +76,7 @@ impl Terrain {
         let limits = Limits::of(settings);
         let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
         Self {
-            horizon: Horizon::new(
-                &settings.body,
-                generator.planet().height_range_m(),
-                settings.sea,
-            ),
+            horizon: Horizon::new(&settings.body, generator.surface_range_m()),
             input: Mutex::default(),
             eyes: RwLock::default(),
             pages: RwLock::new(Pages::new(limits.pages)),
@@ -254,6 +250,7 @@ fn refine_surface(terrain: &Terrain) {
         sights: &eyes.sights,
         body: &terrain.settings.body,
         horizon: terrain.horizon,
+        sea: terrain.settings.sea,
         lod: &terrain.settings.lod,
         frame: output.frame,
     };

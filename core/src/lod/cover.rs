@@ -77,6 +77,8 @@ pub struct Planet<'a> {
     pub body: &'a Ellipsoid,
     /// What the body contributes to bounds.
     pub horizon: Horizon,
+    /// Whether water covers the ground below sea level.
+    pub sea: bool,
     /// The knobs.
     pub lod: &'a LodSettings,
     /// This frame's number.
@@ -200,11 +202,14 @@ impl Planet<'_> {
                 self.cover.pages[id].into_iter().flatten().next().expect("a record has a side");
             let page = self.pages.get(page);
             let bound = page.bound_at(centre);
-            // Without a survey a sea lies at the body's floor, to which the interval shrinks.
             let at = page.sample_index(centre);
-            let height_m = f64::from(page.heights_m[at]) + page.sea_level_m(at);
-            low_m = (height_m - f64::from(bound.variation_m)).max(floor_m);
-            high_m = (height_m + f64::from(bound.variation_m)).max(floor_m);
+            let (height_m, variation_m) =
+                (f64::from(page.heights_m[at]), f64::from(bound.variation_m));
+            // A sea covers what lies lower.
+            let drawn = |ground_m: f64| if self.sea { ground_m.max(0.0) } else { ground_m };
+            let (sea_level_m, doubt_m) = (page.sea_level_m(at), page.sea_level_variation_m());
+            low_m = (drawn(height_m - variation_m) + sea_level_m - doubt_m).max(floor_m);
+            high_m = (drawn(height_m + variation_m) + sea_level_m + doubt_m).max(floor_m);
             let is_even = level.is_multiple_of(2);
             error_m = f64::from(if is_even { bound.error_even_m } else { bound.error_odd_m });
         }

@@ -59,11 +59,9 @@ pub struct Horizon {
 }
 
 impl Horizon {
-    /// Of a body whose ground lies within `height_range_m`; a sea hides what is below height 0.
-    pub fn new(body: &Ellipsoid, height_range_m: [f64; 2], sea: bool) -> Self {
-        let [low_m, high_m] = height_range_m;
-        let surface_m = |height_m: f64| if sea && height_m < 0.0 { 0.0 } else { height_m };
-        let (floor_m, peak_m) = (surface_m(low_m), surface_m(high_m));
+    /// Of a body whose drawn surface lies within `surface_range_m` above the ellipsoid.
+    pub fn new(body: &Ellipsoid, surface_range_m: [f64; 2]) -> Self {
+        let [floor_m, peak_m] = surface_range_m;
         Self { curvature_m: body.curvature_radii_m(), floor_m, peak_m }
     }
 

@@ -23,6 +23,7 @@ pub fn scene(patch_depth: u8, triangles_max: u32) -> SceneSettings {
             style: Style::Earthlike,
             relief: 1.0,
             finest_m: 0.2,
+            detail: 1.0,
         }],
         lod: LodSettings {
             tolerance: Pixels(2.0),
