@@ -197,7 +197,6 @@ fn lines(criterion: &mut Criterion, ground: &Ground) {
     criterion.bench_function("line of sight over 50 km", |b| {
         let sight =
             || ground.line_of_sight(ends[0], black_box(ends[1]), Refraction::FourThirds, QUERY);
-        println!("{:?}", sight());
         b.iter(sight);
     });
 }

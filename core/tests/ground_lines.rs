@@ -9,6 +9,7 @@ mod ground_rig;
 
 use glam::DVec3;
 use ground_rig::*;
+use overfly_core::datasource::PageKey;
 use overfly_core::digest::mix;
 use overfly_core::geodesy::{Ecef, Geodetic};
 use overfly_core::ground::{Answer, Ground, Hit, Place, Query, Refraction, Region, Sight};
@@ -26,21 +27,15 @@ fn stepped(
     (max_m, step_m): (f64, f64),
     query: Query,
 ) -> Option<f64> {
-    let above = |t: f64| above_m(ground, origin + direction * t, query);
-    let mut from = 0.0;
-    while from < max_m {
-        let to = f64::min(from + step_m, max_m);
-        if above(to) < 0.0 {
-            let (mut low, mut high) = (from, to);
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if above(middle) < 0.0 { high = middle } else { low = middle }
-            }
-            return Some(high);
-        }
-        from = to;
+    let below = |t: f64| above_m(ground, origin + direction * t, query) < 0.0;
+    let steps = (1..).map(|i| f64::from(i) * step_m).take_while(|&t| t < max_m + step_m);
+    let first_m = steps.map(|t| t.min(max_m)).find(|&t| below(t))?;
+    let (mut low, mut high) = (first_m - step_m, first_m);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        (low, high) = if below(middle) { (low, middle) } else { (middle, high) };
     }
-    None
+    Some(high)
 }
 
 /// A random ray over a region: its beginning above the ground, and its direction.
@@ -152,7 +147,7 @@ fn a_ray_says_when_it_passed_what_is_coarse_or_not_there() {
 #[test]
 fn rays_over_the_poles_and_from_orbit_hit_the_ground() {
     let generator = generator();
-    let roots: Vec<_> = (0..4).map(|q| overfly_core::datasource::PageKey::root(q)).collect();
+    let roots: Vec<_> = (0..4).map(PageKey::root).collect();
     let pages: Vec<_> = roots.into_iter().map(|key| generator.page(key)).collect();
     let ground = ground_of(&pages, true);
     for i in 0..400_u64 {
@@ -227,7 +222,7 @@ fn least_clearance_m(
 #[test]
 fn refraction_lets_radio_see_beyond_the_optical_horizon() {
     let generator = generator();
-    let roots: Vec<_> = (0..4).map(|q| overfly_core::datasource::PageKey::root(q)).collect();
+    let roots: Vec<_> = (0..4).map(PageKey::root).collect();
     let mut flat: Vec<_> = roots.into_iter().map(|key| generator.page(key)).collect();
     for page in &mut flat {
         let page = std::sync::Arc::make_mut(page);

@@ -6,5 +6,18 @@
 //! Not here: reading archives (`overfly_archive`), making pages from tiles (`overfly_core`).
 #![forbid(unsafe_code)]
 
+pub mod block;
+pub mod build;
+pub mod fault;
+pub mod fit;
 pub mod geoid;
+pub mod marks;
+pub mod pyramid;
 pub mod raster;
+pub mod spool;
+pub mod survey;
+pub mod verify;
+
+pub use build::{BuildOptions, Progress, Report, build};
+pub use fault::IngestError;
+pub use verify::{Difference, verify};

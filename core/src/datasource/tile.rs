@@ -20,10 +20,11 @@ pub const FULL: u8 = 255;
 pub const MARK_STRIDE: usize = 8;
 /// Marks along one side of a tile.
 pub const MARK_SIDE: usize = (PAGE_SIDE - 1) / MARK_STRIDE + 1;
-/// Marks speak of everything within this many sample steps of them, measured along the face of
-/// the octahedron (one step along an axis is √2 long), for patches of depth 4 and less. Deeper
-/// patches reach farther: they read the marks of a coarser tile.
-pub const MARK_REACH: f64 = 23.0;
+/// Marks speak of everything within this many samples of them along both axes: as far as the
+/// descendants of a diamond at the mark reach when patches have depth 4 or less, which is 7.6.
+/// The boxes around the marks that enclose a place cover the box around the place. Deeper patches
+/// reach farther: they read the marks of a coarser tile.
+pub const MARK_REACH: usize = 8;
 /// Unit of [`Mark::range`], in metres.
 pub const RANGE_UNIT_M: f64 = 8.0;
 /// Sea level is kept in this unit, in metres.

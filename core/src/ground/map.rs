@@ -43,7 +43,8 @@ fn places(key: PageKey) -> (usize, usize) {
 impl PageMap {
     /// No pages.
     pub fn new() -> Self {
-        Self { shards: vec![Arc::new(Shard::default()); SHARDS], pages: 0 }
+        let shards = (0..SHARDS).map(|_| Arc::new(Shard::default())).collect();
+        Self { shards, pages: 0 }
     }
 
     /// How many there are.

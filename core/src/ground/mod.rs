@@ -19,8 +19,10 @@
 //! **Pages.** Keep them closed under parents, as the LOD does: a page whose ancestors are missing
 //! answers `Exact` of its own levels and nothing else.
 
+mod angle;
 mod answer;
 mod choose;
+mod local;
 mod map;
 mod patch;
 mod place;
@@ -38,13 +40,14 @@ pub use region::{Region, RegionFault};
 
 use crate::datasource::{Page, PageKey};
 use crate::geodesy::{Ecef, Ellipsoid, Geodetic};
+use angle::sin_cos;
 use choose::{Choice, Recent, choose, is_sound};
 use core::f64::consts::FRAC_PI_2;
 use glam::DVec3;
 use map::PageMap;
 use resident::Resident;
 use std::sync::Arc;
-use surface::{Reading, Shape};
+use surface::Shape;
 
 /// Points of one batch whose pages are read at the same time.
 const BATCH: usize = 32;
@@ -58,7 +61,7 @@ pub struct Ground {
     map: PageMap,
 }
 
-/// A sound place of a batch on its way to its answer.
+/// A sound place on its way to its answer.
 #[derive(Clone, Copy)]
 struct Step<'a> {
     normal: DVec3,
@@ -103,7 +106,7 @@ impl Ground {
         if !is_place(at) || !is_sound(query) {
             return Answer::Refused;
         }
-        self.height_along(at.normal(), query)
+        self.height_along(normal_of(at), query)
     }
 
     /// The ground at many places: the same bits as [`Self::height`] gives one by one.
@@ -122,8 +125,8 @@ impl Ground {
         }
     }
 
-    /// In passes: the middle ones do little but read all over the memory, so that many reads are
-    /// under way at once.
+    /// In passes: the middle one does little but read all over the memory, so that many reads are
+    /// under way at once; the last finds everything at hand.
     fn heights_of_batch<'a>(
         &'a self,
         at: &[Geodetic],
@@ -132,27 +135,28 @@ impl Ground {
         recent: &mut Recent<'a>,
     ) {
         let mut steps: [Option<Step<'a>>; BATCH] = [None; BATCH];
-        let mut readings: [Option<Reading>; BATCH] = [None; BATCH];
         for (step, &at) in steps.iter_mut().zip(at).filter(|(_, at)| is_place(**at)) {
-            let normal = at.normal();
+            let normal = normal_of(at);
             *step = Some(Step { normal, place: Place::of(normal), choice: None });
         }
+        let mut touched = 0;
         for step in steps.iter_mut().flatten() {
             step.choice = choose(step.place, query, &mut |key| recent.find(key));
+            if let Some(Choice { page, level, .. }) = step.choice {
+                touched ^= page.touch(step.place.triangle(level).0);
+            }
         }
-        for (reading, step) in readings.iter_mut().zip(&steps) {
-            let Some(Step { place, choice: Some(choice), .. }) = step else { continue };
-            *reading = Some(self.shape.read(choice.page, *place, choice.level));
+        core::hint::black_box(touched);
+        for (answer, step) in answers.iter_mut().zip(&steps) {
+            *answer = step.map_or(Answer::Refused, |step| self.answer(step));
         }
-        for (answer, (step, reading)) in answers.iter_mut().zip(steps.iter().zip(&readings)) {
-            *answer = match (step, reading) {
-                (None, _) => Answer::Refused,
-                (Some(Step { normal, choice: Some(choice), .. }), Some(reading)) => {
-                    Answer::of(self.shape.meet(reading, *normal), choice.coarser)
-                }
-                (Some(_), _) => Answer::NotReady,
-            };
-        }
+    }
+
+    #[inline(always)]
+    fn answer(&self, Step { normal, place, choice }: Step<'_>) -> Answer {
+        let Some(Choice { page, level, coarser }) = choice else { return Answer::NotReady };
+        let reading = self.shape.read(page, place, level);
+        Answer::of(self.shape.meet(&reading, normal), coarser)
     }
 
     /// The ground on the vertical of a point: JSBSim's `GetAGLevel`. The contact's height above
@@ -162,7 +166,7 @@ impl Ground {
             return Answer::Refused;
         }
         let at = self.shape.body.geodetic_from_ecef(point);
-        let normal = at.normal();
+        let normal = normal_of(at);
         self.height_along(normal, query).map(|ground| Contact {
             agl_m: at.height_m - ground.height_m,
             contact: Ecef(self.shape.lift(normal, ground.height_m)),
@@ -172,14 +176,16 @@ impl Ground {
 
     fn height_along(&self, normal: DVec3, query: Query) -> Answer {
         let place = Place::of(normal);
-        match choose(place, query, &mut |key| self.map.find(key)) {
-            None => Answer::NotReady,
-            Some(Choice { page, level, coarser }) => {
-                let reading = self.shape.read(page, place, level);
-                Answer::of(self.shape.meet(&reading, normal), coarser)
-            }
-        }
+        let choice = choose(place, query, &mut |key| self.map.find(key));
+        self.answer(Step { normal, place, choice })
     }
+}
+
+/// The ellipsoid's outward normal at a place.
+#[inline]
+fn normal_of(at: Geodetic) -> DVec3 {
+    let ((sin_lat, cos_lat), (sin_lon, cos_lon)) = (sin_cos(at.lat_rad), sin_cos(at.lon_rad));
+    DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat)
 }
 
 /// Whether latitude and longitude name a place.

@@ -113,11 +113,9 @@ impl Place {
         let scale = f64::from(1_u32 << depth) / f64::from(RADIUS);
         // Both differences are exact.
         let (x, y) = (self.u * scale - f64::from(x), self.v * scale - f64::from(y));
-        let (which, weights) = match cell.cut() {
-            Cut::Main if x >= y => (0, [x - y, y, 1.0 - x]),
-            Cut::Main => (1, [y - x, 1.0 - y, x]),
-            Cut::Anti if x + y <= 1.0 => (0, [1.0 - x - y, x, y]),
-            Cut::Anti => (1, [x + y - 1.0, 1.0 - x, 1.0 - y]),
+        let cut = cell.cut();
+        let (which, weights) = match cut {
+            Cut::Main | Cut::Anti => halves((x, y), matches!(cut, Cut::Anti)),
             Cut::Four => match (y <= x, y <= 1.0 - x) {
                 (true, true) => (0, [2.0 * y, 1.0 - x - y, x - y]),
                 (true, false) => (1, [2.0 * (1.0 - x), x - y, x + y - 1.0]),
@@ -127,6 +125,18 @@ impl Place {
         };
         (cell, cell.triangles()[which], weights)
     }
+}
+
+/// Which half of a square, and the weights of its corners. Without branches: which half it is
+/// nobody can foresee.
+#[inline]
+fn halves((x, y): (f64, f64), anti: bool) -> (usize, [f64; 3]) {
+    let x = [x, 1.0 - x][usize::from(anti)];
+    let above = x < y;
+    let (low, high) = ([y, x][usize::from(above)], [x, y][usize::from(above)]);
+    let others = [low, 1.0 - high];
+    let turned = usize::from(above != anti);
+    (usize::from(above), [high - low, others[turned], others[1 - turned]])
 }
 
 #[derive(Clone, Copy)]

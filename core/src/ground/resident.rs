@@ -5,6 +5,7 @@
 //! Keeps: the page and some 5 KiB about it.
 //! Not here: finding pages (`map`), the surface between samples (`surface`).
 
+use super::place::Cell;
 use crate::datasource::Page;
 use crate::datasource::key::{PAGE_BITS, PAGE_SIDE};
 use crate::datasource::page::{BOUND_SIDE, BOUND_STRIDE, Bound};
@@ -80,15 +81,22 @@ impl Resident {
         for bits in (0..BLOCK_BITS).rev() {
             for at in 0..1_usize << (2 * bits) {
                 let (x, y) = (at & ((1 << bits) - 1), at >> bits);
-                let kids = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                ranges[place(bits, x, y)] =
-                    kids.into_iter().fold(Range::EMPTY, |range, (dx, dy)| {
-                        range.with(ranges[place(bits + 1, 2 * x + dx, 2 * y + dy)])
-                    });
+                let kid = |dx: usize, dy: usize| ranges[place(bits + 1, 2 * x + dx, 2 * y + dy)];
+                let all = kid(0, 0).with(kid(1, 0)).with(kid(0, 1)).with(kid(1, 1));
+                ranges[place(bits, x, y)] = all;
             }
         }
         let worst_m = errors.iter().map(|e| e.even_m.max(e.odd_m)).fold(0.0, f32::max);
         Self { page, ground, error_max_m: f64::from(worst_m), errors, ranges }
+    }
+
+    /// Reads a little of what a height in a cell will need, so that it is in the cache.
+    #[inline]
+    pub fn touch(&self, cell: Cell) -> u32 {
+        let key = self.page.key;
+        let (x, y) = cell.block(key);
+        let sample = |corner| self.page.heights_m[cell.sample(key, corner)].to_bits();
+        sample([0, 0]) ^ sample([0, 2]) ^ self.errors(x, y).even_m.to_bits()
     }
 
     /// Errors over block (x, y).

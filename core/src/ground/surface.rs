@@ -53,9 +53,30 @@ impl Shape {
     /// The same as `surface_from_normal(n) + n · height_m` for n = p/|p|, within 4 nm on the Earth.
     #[inline]
     pub fn lift(&self, p: DVec3, height_m: f64) -> DVec3 {
-        let scaled = DVec3::new(self.a2 * p.x, self.a2 * p.y, self.b2 * p.z);
-        let (round, along) = (1.0 / p.dot(scaled).sqrt(), height_m / p.length());
-        scaled * round + p * along
+        let scaled = self.scaled(p);
+        let (of_foot, of_normal) = (p.dot(scaled).sqrt(), p.length());
+        // One division for both quotients.
+        let both = 1.0 / (of_foot * of_normal);
+        scaled * (both * of_normal) + p * (both * of_foot * height_m)
+    }
+
+    #[inline]
+    fn scaled(&self, p: DVec3) -> DVec3 {
+        DVec3::new(self.a2 * p.x, self.a2 * p.y, self.b2 * p.z)
+    }
+
+    /// The ellipsoid's point whose normal has the direction `p`, of any length.
+    #[inline]
+    pub fn foot(&self, p: DVec3) -> DVec3 {
+        let scaled = self.scaled(p);
+        scaled * (1.0 / p.dot(scaled).sqrt())
+    }
+
+    /// How the foot moves as `p` of unit length turns by `turn`, in metres.
+    pub fn foot_turn(&self, p: DVec3, turn: DVec3) -> DVec3 {
+        let (scaled, moved) = (self.scaled(p), self.scaled(turn));
+        let square = p.dot(scaled);
+        (moved - scaled * (p.dot(moved) / square)) / square.sqrt()
     }
 
     /// Bound on how far the plane of a level sags below the ellipsoid, for levels without bounds
@@ -70,7 +91,7 @@ impl Shape {
     }
 
     /// Bound on the distance from the triangle of this cell to the ground and to finer levels.
-    #[inline]
+    #[inline(always)]
     fn bound_m(&self, page: &Resident, cell: &Cell) -> f64 {
         if cell.level < LEVEL_BOUNDED {
             let relief_m = f64::from(page.ground.high_m) - f64::from(page.ground.low_m);
@@ -81,7 +102,7 @@ impl Shape {
     }
 
     /// Reads from `page` what the height of `place` at `level` needs.
-    #[inline]
+    #[inline(always)]
     pub fn read(&self, page: &Resident, place: Place, level: u8) -> Reading {
         let (cell, corners, weights) = place.triangle(level);
         let key = page.page.key;
@@ -114,7 +135,7 @@ impl Shape {
     }
 
     /// The height where the vertical of `normal` meets the plane that was read.
-    #[inline]
+    #[inline(always)]
     pub fn meet(&self, reading: &Reading, normal: DVec3) -> Height {
         let quadrant = reading.cell.quadrant;
         let corner = |i: usize| {
@@ -123,10 +144,10 @@ impl Shape {
         };
         let [a, b, c] = [corner(0), corner(1), corner(2)];
         let plane = (b - a).cross(c - a);
-        let (up, rise) = (normal.dot(plane), (a - self.lift(normal, 0.0)).dot(plane));
+        let (up, rise) = (normal.dot(plane), (a - self.foot(normal)).dot(plane));
         let length = plane.length();
         let outward = if up < 0.0 { -length } else { length };
-        Height { height_m: rise / up, normal: plane / outward, ..reading.height }
+        Height { height_m: rise / up, normal: plane * (1.0 / outward), ..reading.height }
     }
 
     /// A triangle of a cell.

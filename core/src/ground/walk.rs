@@ -14,6 +14,7 @@
 use super::Ground;
 use super::answer::Query;
 use super::choose::choose;
+use super::local::Local;
 use super::place::{Cell, DEPTH_END, Place, depth_of, level_of};
 use super::region::Square;
 use super::resident::{BLOCK_BITS, Resident, sample_range};
@@ -92,7 +93,7 @@ pub struct Walk<'a> {
 /// A square to visit, with the page that serves it.
 #[derive(Clone, Copy)]
 struct Task<'a> {
-    from_m: f64,
+    span: (f64, f64),
     square: Square,
     page: &'a Resident,
     finer: Option<&'a Resident>,
@@ -120,7 +121,7 @@ impl<'a> Tasks<'a> {
 
     fn add(&mut self, task: Task<'a>) {
         let mut at = self.count;
-        while at > 0 && self.list[at - 1].is_some_and(|before| before.from_m > task.from_m) {
+        while at > 0 && self.list[at - 1].is_some_and(|before| before.span.0 > task.span.0) {
             self.list[at] = self.list[at - 1];
             at -= 1;
         }
@@ -157,14 +158,14 @@ impl<'a> Walk<'a> {
             let page = self.ground.map.find(square.page());
             // Ground that nobody knows may be as high as the body is wide.
             let high_m = page.map_or(self.curvature_max_m, |page| f64::from(page.ground.high_m));
-            let Some((from_m, _)) = self.span(square, high_m) else { continue };
+            let Some(span) = self.span(square, high_m) else { continue };
             match page {
-                Some(page) => tasks.add(Task { from_m, square, page, finer: None }),
-                None => self.unknown_from_m = self.unknown_from_m.min(from_m),
+                Some(page) => tasks.add(Task { span, square, page, finer: None }),
+                None => self.unknown_from_m = self.unknown_from_m.min(span.0),
             }
         }
         for task in tasks.list.into_iter().flatten() {
-            self.page(task.page);
+            self.page(task.page, task.span);
         }
     }
 
@@ -173,30 +174,35 @@ impl<'a> Walk<'a> {
     }
 
     /// Visits a page and all that lies below it.
-    fn page(&mut self, page: &'a Resident) {
+    fn page(&mut self, page: &'a Resident, span: (f64, f64)) {
         let square = Square::of(page.page.key);
+        let local = Local::new((&self.ground.shape, &self.line), page, span);
         if square.depth >= self.depth_end {
-            self.part(page, square, self.service(page));
+            self.part((page, local.as_ref()), square, self.service(page));
             return;
         }
         let mut tasks = Tasks::new();
         for square in (0..4).map(|index| square.child(index)) {
-            let finer = self.ground.map.find(square.page());
-            let high_m = page.ground.high_m.min(finer.map_or(f32::MAX, |page| page.ground.high_m));
-            if let Some((from_m, _)) = self.span(square, f64::from(high_m)) {
-                tasks.add(Task { from_m, square, page, finer });
+            let high_m = f64::from(page.ground.high_m);
+            if let Some(span) = self.span_in(local.as_ref(), square, high_m) {
+                let finer = self.ground.map.find(square.page());
+                tasks.add(Task { span, square, page, finer });
             }
         }
-        for Task { from_m, square, page, finer } in tasks.list.into_iter().flatten() {
-            if self.is_late(from_m) {
+        for Task { span, square, page, finer } in tasks.list.into_iter().flatten() {
+            if self.is_late(span.0) {
                 continue;
             }
             let within = matches!(self.query, Query::Within(_));
             if finer.is_none() || within {
-                self.part(page, square, self.service(page));
+                self.part((page, local.as_ref()), square, self.service(page));
             }
-            if let Some(finer) = finer {
-                self.page(finer);
+            // The finer page knows better how high its ground is.
+            let high_m = finer.map_or(0.0, |finer| f64::from(finer.ground.high_m));
+            if let Some(finer) = finer
+                && let Some(span) = self.span_in(local.as_ref(), square, high_m)
+            {
+                self.page(finer, span);
             }
         }
     }
@@ -212,7 +218,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Visits the triangles of one page over one square of it.
-    fn part(&mut self, page: &'a Resident, square: Square, mut service: Service) {
+    fn part(
+        &mut self,
+        (page, local): (&'a Resident, Option<&Local>),
+        square: Square,
+        mut service: Service,
+    ) {
         let bits = square.depth - page.page.key.depth();
         if bits == BLOCK_BITS && matches!(self.query, Query::Within(_)) {
             let Some(own) = self.service_of_block(page, square) else { return };
@@ -230,13 +241,13 @@ impl<'a> Walk<'a> {
         let mut tasks = Tasks::new();
         for square in (0..4).map(|index| square.child(index)) {
             let high_m = self.high_m(page, square) + service.slack_m;
-            if let Some((from_m, _)) = self.span(square, high_m) {
-                tasks.add(Task { from_m, square, page, finer: None });
+            if let Some(span) = self.span_in(local, square, high_m) {
+                tasks.add(Task { span, square, page, finer: None });
             }
         }
         for task in tasks.list.into_iter().flatten() {
-            if !self.is_late(task.from_m) {
-                self.part(page, task.square, service);
+            if !self.is_late(task.span.0) {
+                self.part((page, local), task.square, service);
             }
         }
     }
@@ -267,10 +278,19 @@ impl<'a> Walk<'a> {
         f64::from(range.high_m)
     }
 
+    /// [`Self::span`], faster where the line over the page is known.
+    fn span_in(&self, local: Option<&Local>, square: Square, high_m: f64) -> Option<(f64, f64)> {
+        let Some(local) = local else { return self.span(square, high_m) };
+        let (from, to) = local.span(square, self.end_m)?;
+        let bend_m = self.line.bend_m(from).min(self.line.bend_m(to));
+        let ceiling_m = local.lowered_m(high_m) + self.margin_m + 1e-6 - bend_m;
+        clip((from, to), local.rise - ceiling_m, local.climb)
+    }
+
     /// The part of the line that may lie below `high_m` and the margin over a square.
     fn span(&self, square: Square, high_m: f64) -> Option<(f64, f64)> {
         let (up, angle) = square.cap();
-        let foot = self.ground.shape.lift(up, 0.0);
+        let foot = self.ground.shape.foot(up);
         let above_m = high_m.max(0.0);
         // One hundredth more than the verticals reach covers the walls of prisms.
         let radius_m = 1.01 * (self.curvature_max_m + above_m) * angle + 1e-6;
@@ -309,7 +329,6 @@ impl<'a> Walk<'a> {
 
     /// Looks at the part of the line over or under one triangle.
     fn triangle(&mut self, triangle: &Triangle, service: Service) {
-        let level = service.level;
         let [a, b, c] = triangle.corners;
         let middle_m = (a - self.line.origin).dot(self.line.direction);
         let middle = self.line.at(middle_m);
@@ -339,23 +358,19 @@ impl<'a> Walk<'a> {
         if service.coarser && least_m <= service.slack_m + self.margin_m {
             self.coarser_from_m = self.coarser_from_m.min(span.0 + middle_m);
         }
+        let place = match self.goal {
+            Goal::FirstHit => height.first_below(span),
+            Goal::Clearance if least_m < self.margin_m => {
+                Some(if height.at(span.0) <= height.at(span.1) { span.0 } else { span.1 })
+            }
+            Goal::Clearance => None,
+        };
+        let Some(s) = place else { return };
+        let distance_m = s + middle_m;
+        self.met = Some(Meeting { distance_m, normal: plane, level: service.level });
         match self.goal {
-            Goal::FirstHit => {
-                if let Some(s) = height.first_below(span) {
-                    self.end_m = s + middle_m;
-                    self.met = Some(Meeting { distance_m: self.end_m, normal: plane, level });
-                }
-            }
-            Goal::Clearance => {
-                for s in [span.0, span.1] {
-                    let clearance_m = height.at(s) / lean;
-                    if clearance_m < self.margin_m {
-                        let distance_m = s + middle_m;
-                        self.met = Some(Meeting { distance_m, normal: plane, level });
-                        self.margin_m = clearance_m;
-                    }
-                }
-            }
+            Goal::FirstHit => self.end_m = distance_m,
+            Goal::Clearance => self.margin_m = least_m,
         }
     }
 }
@@ -393,7 +408,7 @@ impl Parabola {
 
 /// The part of a span where offset + slope·s is at most 0.
 #[inline]
-fn clip((from, to): (f64, f64), offset: f64, slope: f64) -> Option<(f64, f64)> {
+pub(super) fn clip((from, to): (f64, f64), offset: f64, slope: f64) -> Option<(f64, f64)> {
     if slope == 0.0 {
         return (offset <= 0.0).then_some((from, to));
     }

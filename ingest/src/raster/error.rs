@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Why an elevation file cannot be opened or read.
 #[derive(Debug)]
 pub enum RasterError {
-    /// The operating system refused, or the file ends too early.
+    /// The operating system refused.
     Io {
         /// The file.
         name: PathBuf,
@@ -46,6 +46,10 @@ pub enum RasterError {
 
 impl RasterError {
     pub(crate) fn io(name: &Path, source: io::Error) -> Self {
+        // The system's own words for this say nothing of the file.
+        if source.kind() == io::ErrorKind::UnexpectedEof {
+            return Self::broken(name, "it ends too early, or what is packed in it does");
+        }
         Self::Io { name: name.to_path_buf(), source }
     }
 

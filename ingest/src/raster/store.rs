@@ -20,6 +20,10 @@ pub const CACHE_BYTES: usize = 96 << 20;
 /// What a chunk costs beside its samples: keys, links, the allocation itself.
 const ENTRY_BYTES: usize = 128;
 
+/// Chunks larger than this are decoded one at a time, whatever raster they are of: memory stays
+/// bounded, and threads that need the same one decode it once.
+pub(crate) const ALONE_BYTES: usize = 4 << 20;
+
 /// Decoders of TIFF files left open at the same time; each holds a file handle.
 const OPEN_DECODERS_MAX: usize = 64;
 
@@ -34,6 +38,8 @@ type Key = (u64, u64);
 pub struct ChunkStore {
     chunks: Mutex<Chunks>,
     budget_bytes: usize,
+    /// Held while a large chunk is decoded.
+    alone: Mutex<()>,
     scratch: Mutex<Scratch>,
     rasters: AtomicU64,
     decoders: AtomicUsize,
@@ -58,6 +64,7 @@ impl ChunkStore {
         Arc::new(Self {
             chunks: Mutex::new(Chunks { of: LruCache::unbounded(), bytes: 0 }),
             budget_bytes,
+            alone: Mutex::default(),
             scratch: Mutex::default(),
             rasters: AtomicU64::new(0),
             decoders: AtomicUsize::new(0),
@@ -79,13 +86,18 @@ impl ChunkStore {
         self.chunks.lock().of.get(&key).cloned()
     }
 
-    /// Decodes a chunk of `bytes` into the store. Nobody waits for it but the caller.
+    /// Decodes a chunk of `bytes` into the store. Nobody waits for it but the caller and, if it
+    /// is large, those who need a large one too.
     pub(crate) fn load(
         &self,
         key: Key,
         bytes: usize,
         decode: impl FnOnce() -> Result<Samples, RasterError>,
     ) -> Result<Arc<Samples>, RasterError> {
+        let _alone = (bytes > ALONE_BYTES).then(|| self.alone.lock());
+        if let Some(samples) = self.get(key) {
+            return Ok(samples);
+        }
         self.chunks.lock().make_room(bytes, self.budget_bytes);
         let decoded = decode();
         let mut chunks = self.chunks.lock();
@@ -208,6 +220,22 @@ mod tests {
         assert!(store.bytes() <= 4000, "{}", store.bytes());
         store.forget(0);
         assert_eq!(store.bytes(), 0);
+    }
+
+    #[test]
+    fn a_large_chunk_that_several_threads_need_is_decoded_once() {
+        let store = ChunkStore::new(4000);
+        let decoded = AtomicUsize::new(0);
+        let decode = || {
+            decoded.fetch_add(1, Ordering::Relaxed);
+            chunk(1000)
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| store.load((0, 0), ALONE_BYTES + 1, decode).unwrap());
+            }
+        });
+        assert_eq!(decoded.into_inner(), 1);
     }
 
     #[test]

@@ -27,10 +27,7 @@ use tiff::{ColorType, TiffError, TiffResult};
 /// Most bytes that one strip or tile may decode to.
 const CHUNK_BYTES_MAX: u64 = 128 << 20;
 
-/// Chunks larger than this are decoded by one thread at a time, so that memory stays bounded.
-const LANE_BYTES_MAX: u64 = 4 << 20;
-
-/// Decoders of one file at the same time, for small chunks.
+/// Decoders of one file at the same time. (Large chunks are decoded one at a time anyway.)
 const LANES: usize = 4;
 
 /// Files with more chunks get one decoder: each holds the table of chunks.
@@ -85,9 +82,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<Found, RasterEr
     let declared_nodata = nodata(path, &mut decoder)?;
     let (scale, offset_m) = scale(path, &mut decoder)?;
     let places = chunk_places(path, &mut decoder)?;
-    let chunk_bytes = u64::from(chunks.width) * u64::from(chunks.height) * u64::from(number.bytes);
-    let crowded = chunk_bytes > LANE_BYTES_MAX || places.len() > LANE_CHUNKS_MAX;
-    let lanes = if crowded { 1 } else { LANES };
+    let lanes = if places.len() > LANE_CHUNKS_MAX { 1 } else { LANES };
     let source = TiffSource {
         chunks: places,
         packing,

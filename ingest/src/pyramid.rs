@@ -1,0 +1,359 @@
+//! The tiles of every layer, from its last level up to the roots.
+//!
+//! In:    layers over rasters.
+//! Out:   records in a spool: heights, weights and what is known of everything finer.
+//! Keeps: nothing.
+//! Not here: heights at lattice points (`block`, `fit`), marks and bytes (`marks`, `write`).
+//!
+//! A coarser tile takes every second sample of its four children: a point has one height at all
+//! depths. Errors add up on the way: between two consecutive lattice levels surfaces differ most at
+//! the new points, so each level adds the greatest such difference to what the finer one has.
+
+use crate::block::{Block, FINE, Layer, Square};
+use crate::fit::fit;
+use crate::raster::RasterError;
+use crate::spool::{BLOCKS, MARKS, Record, Spool, Stat};
+use overfly_core::datasource::key::PAGE_BITS;
+use overfly_core::datasource::page::SAMPLES;
+use overfly_core::datasource::tile::{FULL, MARK_SIDE, MARK_STRIDE};
+use overfly_core::datasource::{PAGE_SIDE, PageKey};
+use overfly_core::geodesy::narrow;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Points around a block whose heights are fitted along, and roughness is read from.
+const MARGIN: usize = 18;
+/// Tiles along a side of a block.
+const TILES: u32 = 4;
+/// Roughness is looked at within so many samples of a mark.
+const AROUND: usize = 4;
+/// Second differences of this share of the step are as rough as it gets.
+const ROUGHEST: f64 = 0.02;
+
+/// Why tiles could not be made.
+#[derive(Debug)]
+pub enum MakeError {
+    /// A raster could not be read.
+    Raster(RasterError),
+    /// The spool could not be written or read.
+    Spool(io::Error),
+    /// It was asked to stop.
+    Stopped,
+}
+
+impl From<RasterError> for MakeError {
+    fn from(error: RasterError) -> Self {
+        Self::Raster(error)
+    }
+}
+
+impl From<io::Error> for MakeError {
+    fn from(error: io::Error) -> Self {
+        Self::Spool(error)
+    }
+}
+
+/// A layer and how its heights become whole numbers.
+pub struct Making<'a> {
+    /// Index of the layer.
+    pub index: u8,
+    /// Its rasters.
+    pub layer: Layer<'a>,
+    /// Depth of its last level.
+    pub depth: u8,
+    /// Heights are multiples of this. Metres.
+    pub quantum_m: f64,
+    /// Postings are met to this.
+    pub slack_m: f64,
+    /// Metres of one step of the last level, about.
+    pub step_m: f64,
+    /// Radius of the body in metres.
+    pub radius_m: f64,
+}
+
+impl Making<'_> {
+    /// Keys of the last level's tiles that may have weight, in order.
+    pub fn last_keys(&self) -> Vec<PageKey> {
+        let mut keys: Vec<PageKey> = (0..4).map(PageKey::root).collect();
+        for depth in 0..=self.depth {
+            keys = keys.into_par_iter().filter(|&key| self.touches(key)).collect();
+            if depth < self.depth {
+                keys = keys.iter().flat_map(|key| (0..4).map(|i| key.child(i))).collect();
+            }
+        }
+        keys.sort_unstable();
+        keys
+    }
+
+    fn touches(&self, key: PageKey) -> bool {
+        let first = [key.x(), key.y()].map(|at| i64::from(at) * 64);
+        let square = Square { quadrant: key.quadrant(), first, side: PAGE_SIDE };
+        self.layer.touches(&square, key.depth() + PAGE_BITS, self.radius_m)
+    }
+
+    /// Makes the last level's tiles; `done` is told how many at a time.
+    ///
+    /// # Errors
+    /// If something cannot be read or written, or it was asked to stop.
+    pub fn last_level(
+        &self,
+        keys: &[PageKey],
+        spool: &Spool,
+        stop: &AtomicBool,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<(), MakeError> {
+        let span = TILES.min(1 << self.depth);
+        let mut blocks: BTreeMap<(u8, u32, u32), Vec<PageKey>> = BTreeMap::new();
+        for &key in keys {
+            let place = (key.quadrant(), key.x() / span, key.y() / span);
+            blocks.entry(place).or_default().push(key);
+        }
+        let blocks: Vec<_> = blocks.into_iter().collect();
+        blocks.par_iter().try_for_each(|((quadrant, x, y), keys)| {
+            if stop.load(Ordering::Relaxed) {
+                return Err(MakeError::Stopped);
+            }
+            let first = [x * span, y * span];
+            if !self.block(*quadrant, first, span, keys, spool)? {
+                for key in keys {
+                    self.block(*quadrant, [key.x(), key.y()], 1, &[*key], spool)?;
+                }
+            }
+            done(keys.len() as u64);
+            Ok(())
+        })
+    }
+
+    /// The tiles of one block; `false` where it must be cut.
+    fn block(
+        &self,
+        quadrant: u8,
+        first: [u32; 2],
+        span: u32,
+        keys: &[PageKey],
+        spool: &Spool,
+    ) -> Result<bool, MakeError> {
+        let margin = i64::try_from(MARGIN).expect("small");
+        let square = Square {
+            quadrant,
+            first: first.map(|at| i64::from(at) * 64 - margin),
+            side: span as usize * 64 + 1 + 2 * MARGIN,
+        };
+        let Some(mut block) = self.layer.block(&square, span == 1)? else { return Ok(false) };
+        fit(&mut block, self.slack_m);
+        for key in keys {
+            let at = [key.x() - first[0], key.y() - first[1]].map(|at| at as usize * 64 + MARGIN);
+            let record = self.record(&block, square.side, at);
+            if record.weights[0].iter().any(|&weight| weight > 0) {
+                spool.put(self.index, *key, &record)?;
+            }
+        }
+        Ok(true)
+    }
+
+    fn record(&self, block: &Block, side: usize, [column, row]: [usize; 2]) -> Box<Record> {
+        let mut record = bytemuck::zeroed_box::<Record>();
+        for at in 0..SAMPLES {
+            let from = (row + at / PAGE_SIDE) * side + column + at % PAGE_SIDE;
+            record.quanta[0][at] = self.quantum(block.heights[from]);
+            #[expect(clippy::cast_possible_truncation, reason = "a weight is at most 1")]
+            #[expect(clippy::cast_sign_loss, reason = "and at least 0")]
+            let weight = (block.weights[from] * f32::from(FULL)).round() as u8;
+            record.weights[0][at] = weight;
+            record.filled[0][at] = u8::from(block.filled[from]);
+        }
+        for mark in 0..MARKS {
+            let (i, j) = (mark % MARK_SIDE * MARK_STRIDE, mark / MARK_SIDE * MARK_STRIDE);
+            record.roughness[0][mark] = self.roughness(block, side, [column + i, row + j]);
+        }
+        for (b, stats) in record.stats.iter_mut().enumerate() {
+            for (a, stat) in stats.iter_mut().enumerate() {
+                *stat = Stat::NONE;
+                stat.full = 1;
+                let nodes = Nodes { quanta: &record.quanta[0], weights: &record.weights[0] };
+                nodes.look(stat, [a, b], self.quantum_m, true);
+                stat.error_m = [nodes.odd_m([a, b], self.quantum_m), 0.0];
+            }
+        }
+        record
+    }
+
+    fn quantum(&self, height: i64) -> i32 {
+        #[expect(clippy::cast_possible_truncation, reason = "heights are below 2^24 quanta")]
+        let quanta = (height as f64 / FINE / self.quantum_m).round() as i32;
+        quanta
+    }
+
+    /// Mean second difference around a mark, against the step; the quanta's own is left out.
+    fn roughness(&self, block: &Block, side: usize, [column, row]: [usize; 2]) -> u8 {
+        let (mut sum, mut count) = (0.0, 0);
+        for j in row - AROUND..=row + AROUND {
+            for i in column - AROUND..=column + AROUND {
+                let at = j * side + i;
+                for next in [1, side] {
+                    let seen = [at - next, at, at + next].iter().all(|&at| block.weights[at] > 0.0);
+                    if seen {
+                        let bend = block.heights[at - next] - 2 * block.heights[at]
+                            + block.heights[at + next];
+                        sum += bend.unsigned_abs() as f64;
+                        count += 1;
+                    }
+                }
+            }
+        }
+        if count == 0 {
+            return 0;
+        }
+        let bend_m = sum / f64::from(count) / FINE / 2.0 - 0.35 * self.quantum_m;
+        let rough = (bend_m / (ROUGHEST * self.step_m)).clamp(0.0, 1.0) * 15.0;
+        #[expect(clippy::cast_possible_truncation, reason = "at most 15")]
+        #[expect(clippy::cast_sign_loss, reason = "at least 0")]
+        let rough = rough.round() as u8;
+        rough
+    }
+
+    /// Makes the tiles of one depth from those one deeper.
+    ///
+    /// # Errors
+    /// If something cannot be read or written, or it was asked to stop.
+    pub fn coarser(&self, depth: u8, spool: &Spool, stop: &AtomicBool) -> Result<(), MakeError> {
+        let mut keys: Vec<_> =
+            spool.keys(self.index, depth + 1).into_iter().filter_map(PageKey::parent).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        keys.par_iter().try_for_each(|&key| {
+            if stop.load(Ordering::Relaxed) {
+                return Err(MakeError::Stopped);
+            }
+            let record = self.parent(key, spool)?;
+            Ok(spool.put(self.index, key, &record)?)
+        })
+    }
+
+    fn parent(&self, key: PageKey, spool: &Spool) -> Result<Box<Record>, MakeError> {
+        let mut record = bytemuck::zeroed_box::<Record>();
+        record.stats = [[Stat::NONE; BLOCKS]; BLOCKS];
+        for index in 0..4 {
+            let Some(child) = spool.get(self.index, key.child(index))? else { continue };
+            let half = (PAGE_SIDE - 1) / 2;
+            let (column, row) = (index % 2 * half, index / 2 * half);
+            for j in 0..=half {
+                for i in 0..=half {
+                    let (to, from) =
+                        ((row + j) * PAGE_SIDE + column + i, 2 * j * PAGE_SIDE + 2 * i);
+                    record.quanta[0][to] = child.quanta[0][from];
+                    record.weights[0][to] = child.weights[0][from];
+                    record.filled[0][to] = child.filled[0][from];
+                }
+            }
+            let half = BLOCKS / 2;
+            for j in 0..=half {
+                for i in 0..=half {
+                    let to = (index / 2 * half + j) * MARK_SIDE + index % 2 * half + i;
+                    record.roughness[0][to] = child.roughness[0][2 * j * MARK_SIDE + 2 * i];
+                }
+            }
+            for (b, a) in (0..half).flat_map(|b| (0..half).map(move |a| (b, a))) {
+                let parts = [0, 1].map(|y| [0, 1].map(|x| child.stats[2 * b + y][2 * a + x]));
+                record.stats[index / 2 * half + b][index % 2 * half + a] =
+                    joined(parts.as_flattened());
+            }
+        }
+        for b in 0..BLOCKS {
+            for a in 0..BLOCKS {
+                let nodes = Nodes { quanta: &record.quanta[0], weights: &record.weights[0] };
+                let mut stat = record.stats[b][a];
+                nodes.look(&mut stat, [a, b], self.quantum_m, false);
+                stat.error_m[0] = nodes.odd_m([a, b], self.quantum_m) + stat.error_m[1];
+                record.stats[b][a] = stat;
+            }
+        }
+        Ok(record)
+    }
+}
+
+/// What four blocks are together, seen one level coarser.
+fn joined(parts: &[Stat]) -> Stat {
+    let mut whole = Stat { full: 1, ..Stat::NONE };
+    for part in parts {
+        whole.error_m[1] = whole.error_m[1].max(part.centre_m + part.error_m[0]);
+        whole.slope_m = whole.slope_m.max(part.slope_m);
+        whole.range_m =
+            [whole.range_m[0].min(part.range_m[0]), whole.range_m[1].max(part.range_m[1])];
+        whole.full &= part.full;
+    }
+    whole
+}
+
+/// The samples of a tile.
+struct Nodes<'a> {
+    quanta: &'a [i32; SAMPLES],
+    weights: &'a [u8; SAMPLES],
+}
+
+impl Nodes<'_> {
+    fn places([a, b]: [usize; 2]) -> impl Iterator<Item = (usize, usize)> {
+        let (i, j) = (a * MARK_STRIDE, b * MARK_STRIDE);
+        (j..=j + MARK_STRIDE).flat_map(move |j| (i..=i + MARK_STRIDE).map(move |i| (i, j)))
+    }
+
+    fn height_m(&self, (i, j): (usize, usize), quantum_m: f64) -> Option<f64> {
+        let at = j * PAGE_SIDE + i;
+        (self.weights[at] > 0).then(|| f64::from(self.quanta[at]) * quantum_m)
+    }
+
+    /// Distance of a sample from the middle of two others, where all three are seen.
+    fn strays_m(&self, at: (usize, usize), ends: [(usize, usize); 2], quantum_m: f64) -> f64 {
+        let height = |place| self.height_m(place, quantum_m);
+        match (height(at), height(ends[0]), height(ends[1])) {
+            (Some(at), Some(a), Some(b)) => (at - f64::midpoint(a, b)).abs(),
+            _ => 0.0,
+        }
+    }
+
+    /// Centres, and at the last level also heights, steps and weights of a block.
+    fn look(&self, stat: &mut Stat, block: [usize; 2], quantum_m: f64, last_level: bool) {
+        let mut centre_m = 0.0_f64;
+        for (i, j) in Self::places(block) {
+            if i % 2 == 1 && j % 2 == 1 {
+                let rising = (i / 2) % 2 == (j / 2) % 2;
+                let ends = if rising {
+                    [(i - 1, j - 1), (i + 1, j + 1)]
+                } else {
+                    [(i - 1, j + 1), (i + 1, j - 1)]
+                };
+                centre_m = centre_m.max(self.strays_m((i, j), ends, quantum_m));
+            }
+            if !last_level {
+                continue;
+            }
+            stat.full &= u32::from(self.weights[j * PAGE_SIDE + i] == FULL);
+            let Some(height_m) = self.height_m((i, j), quantum_m) else { continue };
+            let range = &mut stat.range_m;
+            *range = [range[0].min(narrow(height_m)), range[1].max(narrow(height_m))];
+            for next in [(i + 1, j), (i, j + 1)] {
+                let inside = next.0 < PAGE_SIDE && next.1 < PAGE_SIDE;
+                let next_m = if inside { self.height_m(next, quantum_m) } else { None };
+                let step_m = next_m.map_or(0.0, |next_m| (next_m - height_m).abs());
+                stat.slope_m = stat.slope_m.max(narrow(step_m));
+            }
+        }
+        stat.centre_m = narrow(centre_m);
+    }
+
+    /// How far the middles of the next coarser grid's sides stray from them.
+    fn odd_m(&self, block: [usize; 2], quantum_m: f64) -> f32 {
+        let mut most_m = 0.0_f64;
+        for (i, j) in Self::places(block) {
+            let ends = match (i % 2, j % 2) {
+                (1, 0) => [(i - 1, j), (i + 1, j)],
+                (0, 1) => [(i, j - 1), (i, j + 1)],
+                _ => continue,
+            };
+            most_m = most_m.max(self.strays_m((i, j), ends, quantum_m));
+        }
+        narrow(most_m)
+    }
+}
