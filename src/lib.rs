@@ -1,41 +1,59 @@
 //! The terrain backend of a flight simulator: a whole planet, a known error, a frame rate that
 //! holds.
 //!
-//! In:    a scene, a pose each frame, pages from a loader.
-//! Out:   draws, finished pictures, counts and a digest of each frame.
-//! Keeps: [`Overfly`]: terrain, workers, graph, renderer.
+//! In:    a scene, a pose each frame, pages from a loader; places and regions.
+//! Out:   draws, finished pictures, counts and a digest of each frame; heights of the ground.
+//! Keeps: [`Overfly`]: terrain, workers, graph, renderer, open archives, requested ground.
 //! Not here: the stages (`overfly_core`), Vulkan (`overfly_render_vk`), files (`overfly_replay`).
 #![forbid(unsafe_code)]
 
+pub use overfly_archive as archive;
 pub use overfly_config as config;
 pub use overfly_core as core;
+pub use overfly_ingest as ingest;
 pub use overfly_jobs as jobs;
 pub use overfly_render_vk as render_vk;
 pub use overfly_replay as replay;
 
+pub mod error;
 pub mod loader;
+mod requests;
+mod resident;
+pub mod sources;
+pub mod surveyor;
+
+pub use error::{FlightError, FrameError, OpenError};
+pub use requests::{RequestError, Ticket};
 
 /// The README's program is compiled and run as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-use crate::core::camera::ViewFault;
-use crate::core::datasource::generate::Generator;
+use crate::archive::OpenOptions;
+use crate::core::datasource::PageKey;
 use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
 use crate::core::geodesy::Geodetic;
+use crate::core::ground::{Ground, Query, Readiness, Region, RegionFault};
 use crate::core::scene::{FrameParts, extract, world_of};
 use crate::core::settings::SceneSettings;
-use crate::jobs::{Graph, Span, Spans, StagePanic, StartError, Team, Workers};
+use crate::jobs::{Graph, Span, Spans, Team, Workers};
 use crate::render_vk::{DrawError, DrawReport, Renderer};
 use crate::replay::Flight;
 use loader::Loader;
 use parking_lot::Mutex;
-use std::fmt;
+use requests::Requests;
+use resident::ResidentGround;
+use sources::{SourceError, Sources};
+use std::cell::RefCell;
 use std::sync::Arc;
+use surveyor::Surveyor;
 
 /// Name of the stage that records and submits the pictures.
 pub const RECORD: Span = Span("render_vk.record");
+
+/// Pages that a surveyor for a flight keeps: 32 MiB.
+const FLIGHT_PAGES: usize = 512;
 
 /// What the stages of one graph share.
 struct House {
@@ -57,49 +75,33 @@ pub struct Overfly {
     house: House,
     graph: Graph<House>,
     workers: Workers,
-    generator: Arc<Generator>,
+    sources: Arc<Sources>,
+    ground: ResidentGround,
+    requests: Requests,
     world: hecs::World,
 }
 
-/// Why a frame failed.
-#[derive(Debug)]
-pub enum FrameError {
-    /// A view cannot be used; the state is as it was.
-    View(ViewFault),
-    /// A stage panicked: a bug of ours.
-    Stage(StagePanic),
-    /// Vulkan failed; the terrain is not touched by that.
-    Draw(DrawError),
-}
-
-impl fmt::Display for FrameError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::View(fault) => fault.fmt(f),
-            Self::Stage(panic) => panic.fmt(f),
-            Self::Draw(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for FrameError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::View(fault) => Some(fault),
-            Self::Stage(panic) => Some(panic),
-            Self::Draw(error) => Some(error),
-        }
-    }
-}
-
 impl Overfly {
-    /// A scene with `workers` threads beside the caller; 0 is fine.
+    /// A scene with `workers` threads beside the caller; 0 is fine. Opens the scene's archives:
+    /// blocks where one is on a server.
     ///
     /// # Errors
-    /// If the system refuses a thread, or `workers` is above 64.
-    pub fn new(settings: &SceneSettings, workers: usize) -> Result<Self, StartError> {
-        let generator = Arc::new(Generator::new(settings));
-        let terrain = Terrain::new(settings, &generator);
+    /// If the system refuses a thread, `workers` is above 64, or an archive cannot be used.
+    pub fn new(settings: &SceneSettings, workers: usize) -> Result<Self, OpenError> {
+        Self::with_options(settings, workers, &OpenOptions::default())
+    }
+
+    /// As [`Self::new`], as patient with servers as `options` says.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_options(
+        settings: &SceneSettings,
+        workers: usize,
+        options: &OpenOptions,
+    ) -> Result<Self, OpenError> {
+        let sources = Arc::new(Sources::open(settings, options).map_err(OpenError::Source)?);
+        let terrain = Terrain::new(settings, sources.generator());
         let mut graph = Graph::new();
         let placed = add_stages(&mut graph, |house: &House| &house.terrain);
         graph.stage(RECORD, &[placed], |house: &House, team| {
@@ -112,11 +114,14 @@ impl Overfly {
                 *report = Some(renderer.draw(view, &house.terrain.patches(), parts, team));
             }
         });
+        let pages_max = terrain.limits().pages;
         Ok(Self {
             house: House { terrain, drawing: Mutex::default() },
             graph,
-            workers: Workers::new(workers)?,
-            generator,
+            workers: Workers::new(workers).map_err(OpenError::Workers)?,
+            ground: ResidentGround::new(settings.body, settings.sea),
+            requests: Requests::new(sources.clone(), pages_max),
+            sources,
             world: world_of(settings),
         })
     }
@@ -157,11 +162,14 @@ impl Overfly {
         output: &mut FrameOutput,
         view: Option<usize>,
     ) -> Result<Option<DrawReport>, FrameError> {
+        self.ground.note(input.arrived.iter().map(|page| page.key));
         self.house.terrain.begin(input).map_err(FrameError::View)?;
         let drawing = self.house.drawing.get_mut();
         (drawing.view, drawing.parts) = (view, extract(&self.world));
         let ran = self.graph.run(&self.house, &self.workers);
         self.house.terrain.finish(output);
+        self.ground.note(output.evicted.iter().map(|page| page.key));
+        self.requests.collect(|key| self.ground.note(std::iter::once(key)));
         ran.map_err(FrameError::Stage)?;
         self.house.drawing.get_mut().report.take().transpose().map_err(FrameError::Draw)
     }
@@ -203,23 +211,126 @@ impl Overfly {
         self.graph.spans()
     }
 
+    /// Where this scene's pages come from: its archives and the generator.
+    pub fn sources(&self) -> &Arc<Sources> {
+        &self.sources
+    }
+
     /// A loader with `threads` threads for this scene's pages.
     ///
     /// # Errors
     /// If the system refuses a thread.
     pub fn loader(&self, threads: usize) -> std::io::Result<Loader> {
-        Loader::new(self.generator.clone(), threads)
+        Loader::new(self.sources.clone(), threads)
     }
 
-    /// Exact height of the ground above the ellipsoid at a place, in metres: a pure function of
-    /// the scene and the place, whatever is loaded.
-    pub fn ground_height_m(&self, at: Geodetic) -> f64 {
-        self.generator.planet().map_or(0.0, |planet| planet.sample(at.normal()).height_m)
+    /// The ground of all pages that are resident now: the LOD's, and those of requested regions.
+    /// A snapshot that never changes, for any thread.
+    ///
+    /// Costs some 20 µs for each page that came since the last call, the first call for all of
+    /// them; a scene of which nobody asks it pays nothing.
+    pub fn ground(&mut self) -> Ground {
+        self.follow().clone()
     }
 
-    /// A bundled flight over this scene's body and ground: `rainier`, `descent` or `poles`.
-    pub fn flight(&self, name: &str) -> Option<Flight> {
+    fn follow(&mut self) -> &Ground {
+        self.requests.collect(|key| self.ground.note(std::iter::once(key)));
+        self.ground.follow(&self.house.terrain.pages(), &self.requests)
+    }
+
+    /// Has the pages loaded that heights of `level` need anywhere in a region, as before a jump;
+    /// they are part of [`Self::ground`] as they come, in later frames, and stay until
+    /// [`Self::release`]. All requests together hold at most as many pages as the LOD may.
+    ///
+    /// # Errors
+    /// The region is none, or it is too large.
+    pub fn request(&mut self, region: Region, level: u8) -> Result<Ticket, RequestError> {
+        let pages_max = self.requests.pages_max();
+        let pages = self.follow().pages_of(region, level, pages_max);
+        let pages = pages.map_err(RequestError::Region)?;
+        let resident = self.house.terrain.pages();
+        self.requests.add(pages, |key| resident::resident(&resident, key))
+    }
+
+    /// Gives a requested region back: its pages stay only where the LOD or another ticket has them.
+    pub fn release(&mut self, ticket: Ticket) {
+        let gone = |key: PageKey| self.ground.note(std::iter::once(key));
+        self.requests.release(&ticket, gone);
+    }
+
+    /// How much of what heights of `level` need in a region is part of [`Self::ground`].
+    ///
+    /// # Errors
+    /// The region is none, or needs more than a million pages.
+    pub fn readiness(&mut self, region: Region, level: u8) -> Result<Readiness, RegionFault> {
+        self.follow().readiness(region, level)
+    }
+
+    /// Pages of requested regions that could not be loaded when they were last asked for.
+    pub fn faults(&self) -> impl Iterator<Item = (PageKey, &SourceError)> {
+        self.requests.faults()
+    }
+
+    /// Answers for tools, which wait until the pages that they need are loaded.
+    pub fn surveyor(&self, pages_max: usize) -> Surveyor {
+        Surveyor::new(self.sources.clone(), pages_max)
+    }
+
+    /// Exact height of the ground above the ellipsoid at a place, in metres, beneath water too: a
+    /// pure function of the scene and the place, whatever is loaded. Where an archive has data it
+    /// is the surface of the data's level, else the procedural planet itself.
+    ///
+    /// # Errors
+    /// The archive has data there, and it cannot be read.
+    pub fn ground_height_m(&self, at: Geodetic) -> Result<f64, SourceError> {
+        // Above data the surveyor makes a page or two; a scene without archives never asks it.
+        ground_height_m(&mut Surveyor::beneath_water(self.sources.clone(), 0), at)
+    }
+
+    /// A bundled flight over this scene's body and ground: `rainier`, `descent` or `poles`. Where
+    /// data cannot be read it keeps above the coarser ground that can.
+    ///
+    /// # Errors
+    /// There is no flight of that name, or there is no ground beneath it at all.
+    pub fn flight(&self, name: &str) -> Result<Flight, FlightError> {
         let body = &self.house.terrain.settings().body;
-        crate::replay::flight(name, body, &|at| self.ground_height_m(at))
+        let surveyor = Surveyor::beneath_water(self.sources.clone(), FLIGHT_PAGES);
+        let (surveyor, failed) = (RefCell::new(surveyor), RefCell::new(None));
+        let height_m = |at| {
+            let mut surveyor = surveyor.borrow_mut();
+            ground_height_m(&mut surveyor, at).unwrap_or_else(|error| {
+                let coarser = surveyor.coarser(at, Query::BestResident).found();
+                if coarser.is_none() {
+                    failed.borrow_mut().get_or_insert(error);
+                }
+                coarser.map_or(0.0, |ground| ground.height_m)
+            })
+        };
+        let flight = crate::replay::flight(name, body, &height_m);
+        match (failed.into_inner(), flight) {
+            (Some(error), _) => Err(FlightError::Ground(error)),
+            (None, flight) => flight.ok_or_else(|| FlightError::Unknown(name.to_owned())),
+        }
     }
+
+    /// Leaves archives on servers alone from now on: loaders that wait for a silent one give up.
+    /// For a host that wants to end; dropping it does the same.
+    pub fn close(&self) {
+        self.sources.close();
+    }
+}
+
+impl Drop for Overfly {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn ground_height_m(surveyor: &mut Surveyor, at: Geodetic) -> Result<f64, SourceError> {
+    let sources = surveyor.sources().clone();
+    let place = crate::core::ground::Place::of(at.normal());
+    let planet = || sources.generator().planet().map_or(0.0, |it| it.sample(at.normal()).height_m);
+    let Some(level) = sources.data_level(place)? else { return Ok(planet()) };
+    let answer = surveyor.height(at, Query::Exact(level))?;
+    Ok(answer.found().map_or_else(planet, |height| height.height_m))
 }

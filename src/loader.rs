@@ -1,28 +1,50 @@
 //! Loader threads: turn wanted page keys into pages, beside the frame.
 //!
 //! In:    keys from `FrameOutput::wanted`, or from a recording.
-//! Out:   pages for `FrameInput::arrived`.
-//! Keeps: threads, what is in flight.
-//! Not here: which pages are wanted (`overfly_core::lod`), making one (`Generator`).
+//! Out:   pages for `FrameInput::arrived`; which pages failed, and why.
+//! Keeps: threads, what is in flight, failures and when to try again.
+//! Not here: which pages are wanted (`overfly_core::lod`), making one (`sources`).
 
+use crate::sources::{SourceError, Sources};
 use crossbeam::channel::{Receiver, Sender, unbounded};
-use overfly_core::datasource::generate::Generator;
 use overfly_core::datasource::{Page, PageKey};
 use overfly_jobs::now_ns;
 use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
+/// A page that failed is asked for again after this time, then after twice as long, and so on.
+const WAIT_LEAST_NS: u64 = 500_000_000;
+const WAIT_MOST_NS: u64 = 30_000_000_000;
+/// No more failures than this are remembered.
+const FAILURES_MAX: usize = 4096;
+
+type Outcome = Result<Arc<Page>, SourceError>;
+
 /// The threads, and what is in flight.
+///
+/// Dropping it waits for the tiles that its threads are reading. Where a server may be silent, call
+/// [`Sources::close`] before.
 pub struct Loader {
     jobs: Option<Sender<PageKey>>,
-    done: Receiver<Arc<Page>>,
+    done: Receiver<(PageKey, Outcome)>,
     threads: Vec<JoinHandle<()>>,
+    stops: Arc<AtomicBool>,
     in_flight: BTreeSet<PageKey>,
     /// Pages that are ready and wait for their time or their turn.
     ready: BTreeMap<PageKey, Arc<Page>>,
+    /// Pages that could not be made when they were last asked for.
+    failed: BTreeMap<PageKey, Failure>,
     /// Live arrivals: keys in the order asked for, with the time before which they stay away.
     due: Vec<(PageKey, u64)>,
+}
+
+struct Failure {
+    error: SourceError,
+    wait_ns: u64,
+    again_ns: u64,
 }
 
 impl Loader {
@@ -30,34 +52,40 @@ impl Loader {
     ///
     /// # Errors
     /// If the system refuses a thread.
-    pub fn new(generator: Arc<Generator>, threads: usize) -> std::io::Result<Self> {
+    pub fn new(sources: Arc<Sources>, threads: usize) -> std::io::Result<Self> {
         let (jobs, todo) = unbounded::<PageKey>();
         let (finished, done) = unbounded();
+        let stops = Arc::new(AtomicBool::new(false));
         let start = |index| {
-            let (todo, finished, generator) = (todo.clone(), finished.clone(), generator.clone());
+            let (todo, finished) = (todo.clone(), finished.clone());
+            let (sources, stops) = (sources.clone(), stops.clone());
             let name = format!("loader {index}");
             std::thread::Builder::new()
                 .name(name)
-                .spawn(move || serve(&todo, &finished, &generator))
+                .spawn(move || serve(&todo, &finished, &sources, &stops))
         };
         let threads = (0..threads.max(1)).map(start).collect::<Result<_, _>>()?;
         Ok(Self {
             jobs: Some(jobs),
             done,
             threads,
+            stops,
             in_flight: BTreeSet::new(),
             ready: BTreeMap::new(),
+            failed: BTreeMap::new(),
             due: Vec::new(),
         })
     }
 
-    /// Waits for exactly these pages and appends them in this order.
+    /// Waits for exactly these pages and appends them in this order; all but those that fail, or
+    /// failed a moment ago.
     pub fn fetch(&mut self, keys: &[PageKey], arrived: &mut Vec<Arc<Page>>) {
         keys.iter().for_each(|&key| self.ask(key));
         for &key in keys {
-            while !self.ready.contains_key(&key) {
-                let page = self.done.recv().expect("loader threads live as long as the loader");
-                self.put(page);
+            while self.in_flight.contains(&key) {
+                let (done, outcome) =
+                    self.done.recv().expect("loader threads live as long as the loader");
+                self.put(done, outcome);
             }
             arrived.extend(self.ready.remove(&key));
         }
@@ -76,10 +104,14 @@ impl Loader {
         }
     }
 
-    /// Appends what was requested, is ready and due, in the order of the requests.
+    /// Appends what was requested, is ready and due, in the order of the requests. What failed is
+    /// tried again, first after half a second, then after twice as long each time, up to 30 s.
     pub fn collect(&mut self, arrived: &mut Vec<Arc<Page>>) {
-        while let Ok(page) = self.done.try_recv() {
-            self.put(page);
+        while let Ok((key, outcome)) = self.done.try_recv() {
+            self.put(key, outcome);
+        }
+        if !self.failed.is_empty() {
+            (0..self.due.len()).for_each(|at| self.ask(self.due[at].0));
         }
         let now = now_ns();
         let ready = &mut self.ready;
@@ -93,23 +125,62 @@ impl Loader {
         ready.retain(|key, _| due.iter().any(|(wanted, _)| wanted == key));
     }
 
+    /// Pages that could not be made when they were last asked for, and why.
+    pub fn faults(&self) -> impl Iterator<Item = (PageKey, &SourceError)> {
+        self.failed.iter().map(|(&key, failure)| (key, &failure.error))
+    }
+
+    /// Whether a page failed so lately that it is not yet asked for again.
+    pub fn rests(&self, key: PageKey) -> bool {
+        self.failed.get(&key).is_some_and(|failure| now_ns() < failure.again_ns)
+    }
+
     fn ask(&mut self, key: PageKey) {
-        if !self.ready.contains_key(&key) && self.in_flight.insert(key) {
+        if !self.ready.contains_key(&key) && !self.rests(key) && self.in_flight.insert(key) {
             let jobs = self.jobs.as_ref().expect("open until dropped");
             jobs.send(key).expect("loader threads live as long as the loader");
         }
     }
 
-    fn put(&mut self, page: Arc<Page>) {
-        self.in_flight.remove(&page.key);
-        self.ready.insert(page.key, page);
+    fn put(&mut self, key: PageKey, outcome: Outcome) {
+        self.in_flight.remove(&key);
+        match outcome {
+            Ok(page) => {
+                self.failed.remove(&key);
+                self.ready.insert(key, page);
+            }
+            Err(error) => self.note(key, error),
+        }
+    }
+
+    fn note(&mut self, key: PageKey, error: SourceError) {
+        let before = self.failed.get(&key).map_or(0, |failure| failure.wait_ns);
+        let wait_ns = (2 * before).clamp(WAIT_LEAST_NS, WAIT_MOST_NS);
+        let again_ns = now_ns() + wait_ns;
+        if self.failed.len() >= FAILURES_MAX {
+            self.failed.pop_first();
+        }
+        self.failed.insert(key, Failure { error, wait_ns, again_ns });
     }
 }
 
 /// Makes pages until there is nobody left to ask or to answer.
-fn serve(todo: &Receiver<PageKey>, finished: &Sender<Arc<Page>>, generator: &Generator) {
+fn serve(
+    todo: &Receiver<PageKey>,
+    finished: &Sender<(PageKey, Outcome)>,
+    sources: &Sources,
+    stops: &AtomicBool,
+) {
     for key in todo {
-        if finished.send(generator.page(key)).is_err() {
+        // Whoever waits for this page must hear of it, also where a bug of ours ends it.
+        let made = catch_unwind(AssertUnwindSafe(|| sources.page(key)));
+        let outcome = made.unwrap_or_else(|panic| {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+            let message = text.unwrap_or("a panic without words").to_owned();
+            Err(SourceError::Panic { key, message })
+        });
+        if finished.send((key, outcome)).is_err() || stops.load(Ordering::Relaxed) {
             break;
         }
     }
@@ -117,6 +188,7 @@ fn serve(todo: &Receiver<PageKey>, finished: &Sender<Arc<Page>>, generator: &Gen
 
 impl Drop for Loader {
     fn drop(&mut self) {
+        self.stops.store(true, Ordering::Relaxed);
         self.jobs = None;
         for thread in self.threads.drain(..) {
             // A loader thread that panicked has said so; there is nobody left to tell.
@@ -131,7 +203,8 @@ mod tests {
 
     fn loader() -> Loader {
         let scene = overfly_config::load("small").unwrap();
-        Loader::new(Arc::new(Generator::new(&scene)), 2).unwrap()
+        let sources = Sources::open(&scene, &crate::archive::OpenOptions::default()).unwrap();
+        Loader::new(Arc::new(sources), 2).unwrap()
     }
 
     #[test]
@@ -154,5 +227,25 @@ mod tests {
         }
         loader.collect(&mut arrived);
         assert_eq!(arrived.iter().map(|page| page.key).collect::<Vec<_>>(), keys[1..]);
+    }
+
+    #[test]
+    fn what_failed_is_left_alone_for_twice_as_long_each_time_up_to_half_a_minute() {
+        let mut loader = loader();
+        let key = PageKey::root(0);
+        let mut waits = Vec::new();
+        for _ in 0..9 {
+            loader.put(key, Err(SourceError::Panic { key, message: "no".into() }));
+            waits.push(loader.failed[&key].wait_ns / WAIT_LEAST_NS);
+            assert!(loader.rests(key));
+        }
+        assert_eq!(waits, [1, 2, 4, 8, 16, 32, 60, 60, 60]);
+        let mut arrived = Vec::new();
+        loader.fetch(&[key], &mut arrived);
+        assert!(arrived.is_empty(), "it rests");
+        assert_eq!(loader.faults().count(), 1);
+        loader.failed.get_mut(&key).unwrap().again_ns = 0;
+        loader.fetch(&[key], &mut arrived);
+        assert_eq!((arrived.len(), loader.faults().count()), (1, 0));
     }
 }

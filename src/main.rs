@@ -25,14 +25,27 @@ enum Command {
     Replay(cli::replay::Arguments),
     /// Checks a scene file and shows what it resolves to; all faults at once.
     Check(cli::check::Arguments),
+    /// Says how high the ground is at places, and how sure that is; CSV or JSON.
+    Probe(cli::probe::Arguments),
+    /// Builds an archive of real elevation from GeoTIFF, SRTM or PNG.
+    Ingest(cli::ingest::Arguments),
     /// Shows what this machine has and lacks: Vulkan devices, layers, cores.
     Doctor,
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    // Other commands know themselves which of their values may begin with a hyphen.
+    let probes = std::env::args_os().nth(1).is_some_and(|command| command == "probe");
+    let arguments = if probes {
+        Arguments::parse_from(cli::places::guarded(std::env::args_os()))
+    } else {
+        Arguments::parse()
+    };
+    let outcome = match arguments.command {
         Command::Replay(arguments) => cli::replay::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
+        Command::Probe(arguments) => cli::probe::run(&arguments),
+        Command::Ingest(arguments) => cli::ingest::run(&arguments),
         Command::Doctor => Ok(cli::doctor::run()),
     };
     outcome.unwrap_or_else(|error| {

@@ -98,7 +98,7 @@ struct Store {
 /// Flies a case as often as it says and keeps the least of each time.
 pub fn fly(case: &Case<'_>) -> Result<Columns, Box<dyn Error>> {
     let guide = Overfly::new(&case.scene, 0)?;
-    let flight = guide.flight(case.flight).ok_or("not a bundled flight")?;
+    let flight = guide.flight(case.flight)?;
     let mut store = Store { loader: guide.loader(1)?, pages: BTreeMap::new() };
     let mut least: Option<Columns> = None;
     for _ in 0..case.repeats {

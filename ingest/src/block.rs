@@ -12,7 +12,7 @@ use crate::raster::{Grid, Projection, Raster, RasterError};
 use crate::survey::{Survey, Window};
 use glam::{DVec3, IVec3};
 use overfly_core::geodesy::narrow;
-use overfly_core::geodesy::trig::{atan2, cos, hypot, sin};
+use overfly_core::geodesy::trig::{atan2, cos, sin};
 use overfly_core::lattice::{Quadrant, fold, normal_of};
 use std::f64::consts::FRAC_PI_2;
 
@@ -77,7 +77,7 @@ pub struct Posting {
 
 /// Longitude and latitude of a normal, in radians.
 pub fn lon_lat_of(normal: DVec3) -> [f64; 2] {
-    let across = hypot(normal.x, normal.y);
+    let across = (normal.x * normal.x + normal.y * normal.y).sqrt();
     [atan2(normal.y, normal.x), atan2(normal.z, across)]
 }
 

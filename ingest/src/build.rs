@@ -13,6 +13,7 @@ use crate::pyramid::Making;
 use crate::raster::{OpenOptions, Raster, open};
 use crate::spool::{MARKS, Record, Spool};
 use crate::survey::Survey;
+use glam::IVec3;
 use overfly_archive::metadata::to_json;
 use overfly_core::datasource::codec::encode;
 use overfly_core::datasource::facts::{
@@ -21,7 +22,7 @@ use overfly_core::datasource::facts::{
 use overfly_core::datasource::key::{DEPTH_MAX, PAGE_BITS};
 use overfly_core::datasource::page::SAMPLES;
 use overfly_core::datasource::tile::{
-    FULL, LayerTile, SEA_LEVEL_UNIT_M, Tile, sea_level_grid, sea_level_side,
+    FULL, LayerTile, Mark, SEA_LEVEL_UNIT_M, Tile, sea_level_grid, sea_level_side,
 };
 use overfly_core::datasource::{PAGE_SIDE, PageKey};
 use overfly_core::digest::Chain;
@@ -41,7 +42,7 @@ const POINTS_A_POSTING: f64 = 1.25;
 const BLEND_POSTINGS: f64 = 8.0;
 /// Quanta of heights in whole metres and of others, and per metre of spacing at least.
 const QUANTUM_M: [f64; 2] = [1.0, 0.1];
-const QUANTUM_A_METRE: f64 = 1e-4;
+const QUANTUM_A_METRE: f64 = 3e-4;
 /// Postings of whole metres are met to this.
 const SLACK_M: f64 = 0.25;
 /// From this spacing on the geoid's own nodes may lie a degree apart.
@@ -343,7 +344,8 @@ impl Desk<'_> {
                 .par_iter()
                 .map(|(_, key, layers)| {
                     let (tile, range_m) = self.tile(*key, layers)?;
-                    Ok((encode(&tile, &facts), range_m))
+                    let parent = self.parent(*key)?;
+                    Ok((encode(&tile, parent.as_ref(), &facts), range_m))
                 })
                 .collect();
             for ((_, key, _), (bytes, tile_m)) in batch.iter().zip(tiles?) {
@@ -427,7 +429,7 @@ impl Desk<'_> {
                 f64::from(record.quanta[0][j * PAGE_SIDE + i]) * plan.quantum_m
             };
             let roughness: &[u8; MARKS] = &record.roughness[0];
-            let sea_level = self.sea_level(key, sea_level_grid(plan.depth))?;
+            let sea_level = self.sea_level(key, sea_level_grid(plan.depth), &record)?;
             let [low, high] = [sea_level.iter().min(), sea_level.iter().max()]
                 .map(|level| f64::from(level.copied().unwrap_or(0)) * SEA_LEVEL_UNIT_M);
             for at in (0..SAMPLES).filter(|&at| record.weights[0][at] > 0) {
@@ -449,28 +451,70 @@ impl Desk<'_> {
         Ok((tile, range_m))
     }
 
-    fn sea_level(&self, key: PageKey, grid: u8) -> Result<Vec<i32>, IngestError> {
+    /// What a tile's coding takes from the tile above it: samples and weights.
+    fn parent(&self, key: PageKey) -> Result<Option<Tile>, IngestError> {
+        let Some(above) = key.parent() else { return Ok(None) };
+        let mut parent = Tile { key: above, layers: Vec::new() };
+        for (layer, plan) in (0..).zip(self.plans) {
+            if key.depth() > plan.facts.depth {
+                continue;
+            }
+            let failed = |error| IngestError::Output { path: self.options.output.clone(), error };
+            let Some(record) = self.spool.get(layer, above).map_err(failed)? else { continue };
+            parent.layers.push(LayerTile {
+                layer,
+                quanta: Box::new(record.quanta[0]),
+                weights: Some(Box::new(record.weights[0])),
+                filled: Some(Box::new(record.filled[0].map(|filled| filled == 1))),
+                sea_level: Vec::new(),
+                marks: Box::new([Mark::default(); MARKS]),
+            });
+        }
+        Ok(Some(parent))
+    }
+
+    /// Sea level where the layer is seen; elsewhere whatever costs least.
+    fn sea_level(&self, key: PageKey, grid: u8, record: &Record) -> Result<Vec<i32>, IngestError> {
         let Some(geoid) = &self.geoid else { return Ok(Vec::new()) };
+        if record.weights[0].iter().all(|&weight| weight == 0) {
+            return Ok(Vec::new());
+        }
         let side = sea_level_side(key.depth(), grid);
         let cell = (key.side() >> (side - 1).ilog2()).max(RADIUS >> grid);
         let (u0, v0) = key.origin();
         let (u0, v0) = (u0 / cell * cell, v0 / cell * cell);
-        let count = i32::try_from(side).expect("at most 65");
-        let places = (0..count).flat_map(|j| (0..count).map(move |i| (i, j)));
-        places
-            .map(|(i, j)| {
-                let point = fold(key.quadrant(), u0 + i * cell, v0 + j * cell);
-                let [lon, lat] = lon_lat_of(normal_of(point));
-                let level_m = geoid.undulation_m(lat, lon);
-                if level_m.is_nan() {
-                    return Err(IngestError::GeoidLacks { lat_rad: lat, lon_rad: lon });
+        let mut levels: Vec<Option<i32>> = vec![None; side * side];
+        let samples = (PAGE_SIDE - 1) / (side - 1);
+        let along = |at: usize| i32::try_from(at).expect("at most 65") * cell;
+        for at in (0..SAMPLES).filter(|&at| record.weights[0][at] > 0) {
+            let first = [at % PAGE_SIDE, at / PAGE_SIDE].map(|at| (at / samples).min(side - 2));
+            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let (i, j) = (first[0] + i, first[1] + j);
+                if levels[j * side + i].is_none() {
+                    let point = fold(key.quadrant(), u0 + along(i), v0 + along(j));
+                    levels[j * side + i] = Some(level_at(geoid, point)?);
                 }
-                #[expect(clippy::cast_possible_truncation, reason = "undulations are below 120 m")]
-                let level = (level_m / SEA_LEVEL_UNIT_M).round() as i32;
-                Ok(level)
-            })
-            .collect()
+            }
+        }
+        let mut before = levels.iter().flatten().next().copied().unwrap_or(0);
+        let mut known = |level: Option<i32>| {
+            before = level.unwrap_or(before);
+            before
+        };
+        Ok(levels.into_iter().map(&mut known).collect())
     }
+}
+
+/// Sea level at a lattice point, in its unit.
+fn level_at(geoid: &Geoid, point: IVec3) -> Result<i32, IngestError> {
+    let [lon_rad, lat_rad] = lon_lat_of(normal_of(point));
+    let level_m = geoid.undulation_m(lat_rad, lon_rad);
+    if level_m.is_nan() {
+        return Err(IngestError::GeoidLacks { lat_rad, lon_rad });
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "undulations are below 120 m")]
+    let level = (level_m / SEA_LEVEL_UNIT_M).round() as i32;
+    Ok(level)
 }
 
 fn coord(key: PageKey) -> TileCoord {

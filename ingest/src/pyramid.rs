@@ -24,7 +24,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Points around a block whose heights are fitted along, and roughness is read from.
-const MARGIN: usize = 18;
+const MARGIN: usize = 32;
 /// Tiles along a side of a block.
 const TILES: u32 = 4;
 /// Roughness is looked at within so many samples of a mark.

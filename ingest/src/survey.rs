@@ -7,8 +7,9 @@
 //!
 //! A void is filled from around it: each round of [`RIM`] gives the voids next to a height the mean
 //! of their neighbours. The farther from a height, the more a coarse picture shows through, which
-//! has no voids: means of whole blocks, those without any height filled from the blocks around
-//! them. So a filled height depends on the raster alone, not on the window that asks for it.
+//! has no voids: the lowest of each block, since wide voids are mostly water, and blocks without
+//! any height filled from those around them; what is within [`SEA_M`] of sea level there is the
+//! sea. So a filled height depends on the raster alone, not on the window that asks for it.
 
 use crate::raster::{Raster, RasterError};
 use rayon::prelude::*;
@@ -16,6 +17,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Postings from a void's edge to where the coarse picture alone fills it.
 pub const RIM: usize = 16;
+/// A wide void as close to sea level is taken for the sea: height 0.
+pub const SEA_M: f32 = 10.0;
 /// Blocks of the coarse picture along the longer side of a raster.
 const BLOCKS: usize = 128;
 /// Postings read at once while a raster is looked at.
@@ -55,9 +58,9 @@ pub struct Window {
     pub void: Vec<bool>,
 }
 
-/// Means of the blocks in one band of rows, and what else was seen there.
+/// The lowest of the blocks in one band of rows, and what else was seen there.
 struct Band {
-    sums: Vec<(f64, u64)>,
+    lowest_m: Vec<f32>,
     range_m: [f32; 2],
     voids: u64,
     whole_metres: bool,
@@ -93,13 +96,7 @@ impl Survey {
             survey.range_m[1] = survey.range_m[1].max(band.range_m[1]);
             survey.voids += band.voids;
             survey.whole_metres &= band.whole_metres;
-            survey.coarse.heights_m.extend(
-                band.sums.iter().map(
-                    |&(sum, count)| {
-                        if count > 0 { mean(sum, count) } else { f32::NAN }
-                    },
-                ),
-            );
+            survey.coarse.heights_m.extend(&band.lowest_m);
         }
         survey.coarse.fill();
         Ok(Some(survey))
@@ -184,7 +181,7 @@ impl Band {
     ) -> Result<Self, RasterError> {
         let columns = raster.grid.columns as usize;
         let mut band = Self {
-            sums: vec![(0.0, 0); columns.div_ceil(block)],
+            lowest_m: vec![f32::NAN; columns.div_ceil(block)],
             range_m: [f32::MAX, f32::MIN],
             voids: 0,
             whole_metres: true,
@@ -202,8 +199,8 @@ impl Band {
                 }
                 band.range_m = [band.range_m[0].min(height_m), band.range_m[1].max(height_m)];
                 band.whole_metres &= height_m == height_m.round();
-                let (sum, count) = &mut band.sums[at % columns / block];
-                (*sum, *count) = (*sum + f64::from(height_m), *count + 1);
+                let lowest_m = &mut band.lowest_m[at % columns / block];
+                *lowest_m = lowest_m.min(height_m);
             }
         }
         Ok(band)
@@ -259,7 +256,7 @@ impl Coarse {
         (count > 0).then(|| mean(sum, count))
     }
 
-    /// Bilinear between the middles of blocks.
+    /// Bilinear between the middles of blocks; the sea is flat.
     fn at(&self, posting: [i64; 2]) -> f32 {
         let place = |along: i64, count: usize| {
             let at = (along as f64 + 0.5) / self.block as f64 - 0.5;
@@ -276,7 +273,8 @@ impl Coarse {
         };
         let lower = at(i, j) * (1.0 - a) + at(i + 1, j) * a;
         let upper = at(i, j + 1) * (1.0 - a) + at(i + 1, j + 1) * a;
-        overfly_core::geodesy::narrow(lower * (1.0 - b) + upper * b)
+        let height_m = overfly_core::geodesy::narrow(lower * (1.0 - b) + upper * b);
+        if height_m.abs() <= SEA_M { 0.0 } else { height_m }
     }
 }
 

@@ -14,7 +14,7 @@ use lru::LruCache;
 use overfly_archive::{Archive, Location, OpenOptions};
 use overfly_core::datasource::codec::decode;
 use overfly_core::datasource::key::PAGE_BITS;
-use overfly_core::datasource::tile::{FULL, LayerTile};
+use overfly_core::datasource::tile::{FULL, LayerTile, Tile};
 use overfly_core::datasource::{PAGE_SIDE, PageKey};
 use overfly_core::geodesy::Geodetic;
 use parking_lot::Mutex;
@@ -60,11 +60,12 @@ struct Sums {
     bins: Vec<u64>,
 }
 
-type Cached = LruCache<(PageKey, u8), Option<Arc<LayerTile>>>;
+type Planes = LruCache<(PageKey, u8), Option<Arc<LayerTile>>>;
 
 struct Reader<'a> {
     archive: &'a Archive,
-    tiles: Mutex<Cached>,
+    tiles: Mutex<LruCache<PageKey, Option<Arc<Tile>>>>,
+    planes: Mutex<Planes>,
 }
 
 /// Compares an archive with what it was built from.
@@ -82,7 +83,11 @@ pub fn verify(
     let sources = sources(options, stop, &|_| {})?;
     let plans = plans(options, &sources)?;
     let size = NonZeroUsize::new(TILES).expect("more than none");
-    let reader = Reader { archive: &archive, tiles: Mutex::new(LruCache::new(size)) };
+    let reader = Reader {
+        archive: &archive,
+        tiles: Mutex::new(LruCache::new(size)),
+        planes: Mutex::new(LruCache::new(size)),
+    };
     let parts = |source: &Source| {
         let grid = &source.raster.grid;
         u64::from(grid.rows.div_ceil(PART)) * u64::from(grid.columns.div_ceil(PART))
@@ -215,7 +220,7 @@ impl Reader<'_> {
         let (i, j) = (cell(u), cell(v));
         let tile_at = |at: usize| u32::try_from(at / side).expect("below 2^23");
         let key = PageKey::new(quadrant, depth, tile_at(i), tile_at(j));
-        let Some(tile) = self.tile(key, u8::try_from(layer).expect("16 layers"))? else {
+        let Some(tile) = self.plane(key, u8::try_from(layer).expect("16 layers"))? else {
             return Ok(None);
         };
         let (a, b) = (u - i as f64, v - j as f64);
@@ -236,20 +241,32 @@ impl Reader<'_> {
         Ok(Some(height_m))
     }
 
-    fn tile(&self, key: PageKey, layer: u8) -> Result<Option<Arc<LayerTile>>, IngestError> {
-        if let Some(tile) = self.tiles.lock().get(&(key, layer)) {
+    fn plane(&self, key: PageKey, layer: u8) -> Result<Option<Arc<LayerTile>>, IngestError> {
+        if let Some(plane) = self.planes.lock().get(&(key, layer)) {
+            return Ok(plane.clone());
+        }
+        let tile = self.tile(key)?;
+        let own = |plane: &&LayerTile| plane.layer == layer;
+        let plane = tile.and_then(|tile| tile.layers.iter().find(own).cloned().map(Arc::new));
+        self.planes.lock().put((key, layer), plane.clone());
+        Ok(plane)
+    }
+
+    /// A tile, decoded over its parent.
+    fn tile(&self, key: PageKey) -> Result<Option<Arc<Tile>>, IngestError> {
+        if let Some(tile) = self.tiles.lock().get(&key) {
             return Ok(tile.clone());
         }
         let bytes = self.archive.tile(key).map_err(IngestError::ReadBack)?;
-        let plane = match bytes {
+        let tile = match bytes {
             None => None,
             Some(bytes) => {
-                let tile = decode(&bytes, key, self.archive.facts())
-                    .map_err(|fault| IngestError::Tile { key, fault })?;
-                tile.layers.into_iter().find(|plane| plane.layer == layer).map(Arc::new)
+                let parent = key.parent().map(|parent| self.tile(parent)).transpose()?.flatten();
+                let tile = decode(&bytes, key, parent.as_deref(), self.archive.facts());
+                Some(Arc::new(tile.map_err(|fault| IngestError::Tile { key, fault })?))
             }
         };
-        self.tiles.lock().put((key, layer), plane.clone());
-        Ok(plane)
+        self.tiles.lock().put(key, tile.clone());
+        Ok(tile)
     }
 }

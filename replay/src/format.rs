@@ -37,6 +37,9 @@ pub const KEY_EVERY: u64 = 256;
 /// Largest payload of a block in bytes.
 pub const PAYLOAD_MAX: usize = (1 << 24) - 1;
 
+/// How the paths end under which a header lists what archives hold.
+const CONTENT: &str = ".content";
+
 pub(crate) const HEADER_MARK: u8 = b'H';
 pub(crate) const FRAME_MARK: u8 = b'F';
 pub(crate) const END_MARK: u8 = b'E';
@@ -137,30 +140,32 @@ impl Header {
         }
     }
 
+    /// The same recording, over archives whose contents have these hashes, in the scene's order: it
+    /// is refused over others. Without archives it is as it was.
+    #[must_use]
+    pub fn over_contents(mut self, contents: &[u64]) -> Self {
+        self.settings.extend(listed(contents));
+        self
+    }
+
+    /// Archives whose contents are not the recorded ones. Empty where the recording may be replayed
+    /// as far as they go; always so for a flight.
+    pub fn differs_from_contents(&self, contents: &[u64]) -> Vec<Difference> {
+        if self.kind == Kind::Flight {
+            return Vec::new();
+        }
+        let recorded = self.settings.iter().filter(|(path, _)| path.ends_with(CONTENT));
+        differences(&recorded.cloned().collect::<Vec<_>>(), &listed(contents))
+    }
+
     /// The settings of `scene` that are not the recorded ones, in the recording's order, then those
     /// that the recording lacks. Empty where it may be replayed; always so for a flight.
     pub fn differs_from(&self, scene: &SceneSettings) -> Vec<Difference> {
         if self.kind == Kind::Flight {
             return Vec::new();
         }
-        let now = scene.listing();
-        let find = |list: &[(String, String)], path: &str| {
-            list.iter().find(|(p, _)| p == path).map(|(_, value)| value.clone())
-        };
-        let mut differences = Vec::new();
-        for (path, recorded) in &self.settings {
-            let value = find(&now, path);
-            if value.as_ref() != Some(recorded) {
-                let (path, recorded) = (path.clone(), Some(recorded.clone()));
-                differences.push(Difference { path, recorded, now: value });
-            }
-        }
-        for (path, value) in now {
-            if find(&self.settings, &path).is_none() {
-                differences.push(Difference { path, recorded: None, now: Some(value) });
-            }
-        }
-        differences
+        let recorded = self.settings.iter().filter(|(path, _)| !path.ends_with(CONTENT));
+        differences(&recorded.cloned().collect::<Vec<_>>(), &scene.listing())
     }
 
     /// The payload of the header block.
@@ -209,6 +214,34 @@ impl Header {
         }
         Ok(Self { kind, name, rate_hz, frames, settings_digest, settings, scene_text })
     }
+}
+
+/// What archives hold, as settings beside those of the scene, where they are listed first.
+fn listed(contents: &[u64]) -> Vec<(String, String)> {
+    let each = contents.iter().enumerate();
+    each.map(|(i, hash)| (format!("sources[{i}]{CONTENT}"), format!("{hash:016x}"))).collect()
+}
+
+/// In the order of `recorded`, then what it lacks.
+fn differences(recorded: &[(String, String)], now: &[(String, String)]) -> Vec<Difference> {
+    let find = |list: &[(String, String)], path: &str| {
+        list.iter().find(|(p, _)| p == path).map(|(_, value)| value.clone())
+    };
+    let mut differences = Vec::new();
+    for (path, value) in recorded {
+        let found = find(now, path);
+        if found.as_ref() != Some(value) {
+            let (path, recorded) = (path.clone(), Some(value.clone()));
+            differences.push(Difference { path, recorded, now: found });
+        }
+    }
+    for (path, value) in now {
+        if find(recorded, path).is_none() {
+            let (path, now) = (path.clone(), Some(value.clone()));
+            differences.push(Difference { path, recorded: None, now });
+        }
+    }
+    differences
 }
 
 /// Whether frames can be counted at this rate.

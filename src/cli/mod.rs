@@ -13,10 +13,14 @@ macro_rules! say {
     }};
 }
 
+pub mod answers;
 pub mod check;
 pub mod columns;
 pub mod doctor;
+pub mod ingest;
 pub mod json;
+pub mod places;
+pub mod probe;
 pub mod replay;
 pub mod report;
 pub mod run;
@@ -44,7 +48,8 @@ Examples:
   overfly replay rainier --no-render
   overfly replay descent --stills 8 --size 1280x720
   overfly replay poles --no-render --record poles.ovf --loader-delay-ms 50
-  overfly replay poles.ovf --no-render --workers 0";
+  overfly replay poles.ovf --no-render --workers 0
+  overfly probe --at 46.8523,-121.7603";
 
 /// What ends a command early, in words for the user.
 pub type Failure = Box<dyn std::error::Error>;

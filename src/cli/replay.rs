@@ -13,8 +13,8 @@ use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, place_of, report, w
 use overfly::core::settings::SceneSettings;
 use overfly::render_vk::{Renderer, RendererSettings};
 use overfly::replay::{Ending, Header, RunDigest, Writer};
-use overfly::{Overfly, config};
-use std::collections::VecDeque;
+use overfly::{OpenError, Overfly, config};
+use std::collections::{BTreeSet, VecDeque};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -85,7 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let header = recording_header(&arguments.flight)?;
     let (scene_name, scene) = scene_of(arguments, header.as_ref())?;
     let workers = arguments.workers.map_or_else(default_workers, usize::from);
-    let mut overfly = Overfly::new(&scene, workers)?;
+    let mut overfly =
+        Overfly::new(&scene, workers).map_err(|error| named(error, header.is_some(), arguments))?;
     let mut run = prepare(arguments, &places, scene, &mut overfly)?;
     say!(
         "{} over {scene_name}, frames {}..{} at {} Hz, {workers} workers",
@@ -99,7 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     {
         say!("raised by {:.0} m to stay clear of this scene's ground", flight.raised_m);
     }
-    let finished = fly(&mut run, &mut overfly)?;
+    let finished = fly(&mut run, &mut overfly);
+    // Whatever the loader still waits for, nobody needs it any more.
+    overfly.close();
+    let finished = finished?;
     if let Some(recorder) = run.recorder.take() {
         let frames = recorder.frames();
         recorder.finish()?;
@@ -132,6 +136,15 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let code = verdict(&run.source, run.diverged, finished);
     Ok(if messages.is_empty() { code } else { ExitCode::from(DIVERGED) })
+}
+
+/// An archive that cannot be opened: a recording knows its name, and not always its place.
+fn named(error: OpenError, is_recording: bool, arguments: &Arguments) -> Failure {
+    if is_recording && arguments.scene.is_none() && matches!(error, OpenError::Source(_)) {
+        let hint = "the recording's scene names it so; --scene FILE says where it is now";
+        return format!("{error} ({hint})").into();
+    }
+    error.into()
 }
 
 fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: bool) -> ExitCode {
@@ -213,7 +226,7 @@ fn prepare(
     scene: SceneSettings,
     overfly: &mut Overfly,
 ) -> Result<Run, Failure> {
-    let source = Source::open(&arguments.flight, &scene, |name| overfly.flight(name))?;
+    let source = Source::open(&arguments.flight, &scene, overfly)?;
     let count = source.frames();
     let reported = arguments.frames.clone().unwrap_or(0..count);
     if count == 0 {
@@ -244,7 +257,8 @@ fn prepare(
     let delay = (0..).find(|&frames| f64::from(frames) >= delay_s * source.rate_hz());
     let folder = PathBuf::from("out").join(source.name());
     let recorder = places.record.as_ref().map(|path| {
-        let mut header = Header::recording(source.name(), source.rate_hz(), &scene);
+        let mut header = Header::recording(source.name(), source.rate_hz(), &scene)
+            .over_contents(&overfly.sources().contents());
         header.scene_text = scene_text(arguments, &source);
         Writer::create(path, &header)
     });
@@ -258,6 +272,7 @@ fn prepare(
         count: 0,
         loader: overfly.loader(default_workers().max(1))?,
         recorder: recorder.transpose()?,
+        named: BTreeSet::new(),
         columns: Columns::new(reported.len()),
         digest: RunDigest::default(),
         diverged: None,

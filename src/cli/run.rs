@@ -17,7 +17,7 @@ use overfly::core::settings::SceneSettings;
 use overfly::jobs::now_ns;
 use overfly::loader::Loader;
 use overfly::replay::{RecordedFrame, RunDigest, Writer};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,6 +42,8 @@ pub struct Run {
     pub stills: Vec<usize>,
     pub draws: bool,
     pub loader: Loader,
+    /// Archives of which it was said that they fail.
+    pub named: BTreeSet<String>,
     pub recorder: Option<Writer>,
     pub columns: Columns,
     pub digest: RunDigest,
@@ -118,8 +120,11 @@ fn frame(
     }
     let arriving = arriving(run, played, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
-    let mut record =
-        RecordedFrame { time_s: input.time_s, arrived: arriving, ..Default::default() };
+    if input.arrived.len() < arriving.len() {
+        name_faults(run);
+    }
+    let arrived = input.arrived.iter().map(|page| page.key).collect();
+    let mut record = RecordedFrame { time_s: input.time_s, arrived, ..Default::default() };
     if run.recorder.is_some() {
         record.views.extend_from_slice(&input.views);
     }
@@ -150,6 +155,17 @@ fn frame(
         run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
     }
     Ok(())
+}
+
+/// Says of each archive once that it fails, and how. The ground stays coarser there.
+fn name_faults(run: &mut Run) {
+    for (key, error) in run.loader.faults() {
+        let archive = error.archive().unwrap_or("the planet").to_owned();
+        if run.named.insert(archive) {
+            let depth = key.depth();
+            eprintln!("overfly: {error}; the ground is coarser there (a page of depth {depth})");
+        }
+    }
 }
 
 /// The pages of this frame: as recorded; else what was wanted and is due.

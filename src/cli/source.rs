@@ -7,12 +7,14 @@
 //! Not here: the file format (`overfly::replay`).
 
 use super::Failure;
+use overfly::Overfly;
 use overfly::core::datasource::PageKey;
 use overfly::core::digest::FrameDigest;
 use overfly::core::frame::FrameInput;
 use overfly::core::settings::SceneSettings;
 use overfly::replay::{
-    self, BUNDLED, Ending, Flight, Header, Kind, Reader, RecordedFrame, Recording, view_of,
+    self, BUNDLED, Difference, Ending, Flight, Header, Kind, Reader, RecordedFrame, Recording,
+    view_of,
 };
 use std::path::Path;
 
@@ -38,15 +40,20 @@ pub fn recording_header(name: &str) -> Result<Option<Header>, Failure> {
     Ok((reader.header().kind == Kind::Recording).then(|| reader.header().clone()))
 }
 
+/// Refuses a recording that differs from what is at hand.
+fn refuse(how: &str, name: &str, differences: &[Difference]) -> Result<(), Failure> {
+    if differences.is_empty() {
+        return Ok(());
+    }
+    let list: String = differences.iter().map(|d| format!("\n  {d}")).collect();
+    Err(format!("{name} was recorded {how}, so it cannot be replayed:{list}").into())
+}
+
 impl Source {
     /// Opens a flight or a recording.
-    pub fn open(
-        name: &str,
-        scene: &SceneSettings,
-        bundled: impl Fn(&str) -> Option<Flight>,
-    ) -> Result<Self, Failure> {
-        if let Some(flight) = bundled(name) {
-            return Ok(Self::Flight(flight, Ending::Complete));
+    pub fn open(name: &str, scene: &SceneSettings, overfly: &Overfly) -> Result<Self, Failure> {
+        if BUNDLED.contains(&name) {
+            return Ok(Self::Flight(overfly.flight(name)?, Ending::Complete));
         }
         match recording_header(name)? {
             None => {
@@ -54,15 +61,9 @@ impl Source {
                 Ok(Self::Flight(flight, ending))
             }
             Some(header) => {
-                let differences = header.differs_from(scene);
-                if !differences.is_empty() {
-                    let list: Vec<_> = differences.iter().map(|d| format!("\n  {d}")).collect();
-                    return Err(format!(
-                        "{name} was recorded with another scene, so it cannot be replayed:{}",
-                        list.concat()
-                    )
-                    .into());
-                }
+                let contents = overfly.sources().contents();
+                refuse("with another scene", name, &header.differs_from(scene))?;
+                refuse("over other data", name, &header.differs_from_contents(&contents))?;
                 Ok(Self::Recording(Recording::open(Path::new(name))?))
             }
         }

@@ -18,13 +18,17 @@ pub struct Tour {
     pub flight: Flight,
     pub input: FrameInput,
     pub output: FrameOutput,
-    loader: Loader,
+    pub loader: Loader,
 }
 
 impl Tour {
     pub fn new(flight: &str, scene: &str, workers: usize) -> Self {
         let scene = config::load(scene).unwrap();
         let overfly = Overfly::new(&scene, workers).unwrap();
+        Self::over(overfly, scene, flight)
+    }
+
+    pub fn over(overfly: Overfly, scene: SceneSettings, flight: &str) -> Self {
         Self {
             flight: overfly.flight(flight).unwrap(),
             loader: overfly.loader(2).unwrap(),

@@ -8,7 +8,9 @@
 //! A tile's samples are coded level by level, as the mesh refines: first the corners, then the
 //! centres of cells and the middles of their sides, each predicted by a cubic through four known
 //! samples. Between known neighbours on both sides a smooth surface is foretold far better than
-//! from its rows alone. What is left is coded in the context of how rough it was nearby.
+//! from its rows alone. What is left is coded in the context of how rough it was nearby. Every
+//! second sample is in the parent tile already and is taken from there: so a pyramid costs no more
+//! than its last level.
 
 use super::coder::{Bit, Decoder, Encoder, Number};
 use super::facts::ArchiveFacts;
@@ -92,11 +94,11 @@ impl Stream<'_> {
     }
 }
 
-/// A tile as bytes.
+/// A tile as bytes. `parent` is the tile above it, if there is one in the archive.
 ///
 /// # Panics
 /// If a layer is not one of the archive's, or a height is 2^24 quanta or more from sea level.
-pub fn encode(tile: &Tile, facts: &ArchiveFacts) -> Vec<u8> {
+pub fn encode(tile: &Tile, parent: Option<&Tile>, facts: &ArchiveFacts) -> Vec<u8> {
     let mut mask = 0_u16;
     for layer in &tile.layers {
         assert!(usize::from(layer.layer) < facts.layers.len(), "an archive's own layer");
@@ -107,7 +109,8 @@ pub fn encode(tile: &Tile, facts: &ArchiveFacts) -> Vec<u8> {
     let mut stream = Stream::Writes(Encoder::new(vec![VERSION, low, high]));
     let mut contexts = Contexts::new();
     for layer in &tile.layers {
-        contexts.layer(&mut stream, tile.key, facts, &mut layer.clone());
+        let known = Known::of(parent, tile.key, layer.layer);
+        contexts.layer(&mut stream, (tile.key, known), facts, &mut layer.clone());
     }
     let Stream::Writes(encoder) = stream else { unreachable!("it was made to write") };
     let mut bytes = encoder.finish();
@@ -116,11 +119,16 @@ pub fn encode(tile: &Tile, facts: &ArchiveFacts) -> Vec<u8> {
     bytes
 }
 
-/// The tile that the bytes are.
+/// The tile that the bytes are. `parent` is the decoded tile above it, if the archive has one.
 ///
 /// # Errors
 /// What is wrong with them. Whatever the bytes, memory is that of one tile.
-pub fn decode(bytes: &[u8], key: PageKey, facts: &ArchiveFacts) -> Result<Tile, TileFault> {
+pub fn decode(
+    bytes: &[u8],
+    key: PageKey,
+    parent: Option<&Tile>,
+    facts: &ArchiveFacts,
+) -> Result<Tile, TileFault> {
     let Some((bytes, sum)) = bytes.split_last_chunk::<4>().filter(|(rest, _)| rest.len() >= 3)
     else {
         return Err(TileFault::Short { found: bytes.len() });
@@ -148,7 +156,8 @@ pub fn decode(bytes: &[u8], key: PageKey, facts: &ArchiveFacts) -> Result<Tile, 
             sea_level: Vec::new(),
             marks: Box::new([Mark::default(); MARK_SIDE * MARK_SIDE]),
         };
-        contexts.layer(&mut stream, key, facts, &mut plane);
+        let known = Known::of(parent, key, layer);
+        contexts.layer(&mut stream, (key, known), facts, &mut plane);
         if plane.quanta.iter().any(|quanta| quanta.unsigned_abs() >= QUANTA_END.unsigned_abs()) {
             return Err(TileFault::Numbers);
         }
@@ -167,6 +176,29 @@ fn check_sum(key: PageKey, bytes: &[u8]) -> u32 {
     }
     chain.add(bytes.len() as u64);
     (chain.0 >> 32) as u32
+}
+
+/// The part of a parent's layer that a tile refines: its sample (0, 0) in it.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    layer: &'a LayerTile,
+    first: usize,
+}
+
+impl<'a> Known<'a> {
+    fn of(parent: Option<&'a Tile>, key: PageKey, layer: u8) -> Option<Self> {
+        let parent = parent.filter(|parent| key.parent() == Some(parent.key))?;
+        let half = (PAGE_SIDE - 1) / 2;
+        let (column, row) = (key.child_index() % 2 * half, key.child_index() / 2 * half);
+        let layer = parent.layers.iter().find(|plane| plane.layer == layer)?;
+        Some(Self { layer, first: row * PAGE_SIDE + column })
+    }
+
+    /// Where the parent holds sample `at`, if it does.
+    fn place(&self, at: usize) -> Option<usize> {
+        let (i, j) = (at % PAGE_SIDE, at / PAGE_SIDE);
+        (i % 2 == 0 && j % 2 == 0).then(|| self.first + j / 2 * PAGE_SIDE + i / 2)
+    }
 }
 
 /// What the stream has learnt so far.
@@ -200,25 +232,34 @@ impl Contexts {
     fn layer(
         &mut self,
         stream: &mut Stream<'_>,
-        key: PageKey,
+        (key, known): (PageKey, Option<Known<'_>>),
         facts: &ArchiveFacts,
         layer: &mut LayerTile,
     ) {
-        self.weights(stream, layer);
-        self.fillings(stream, layer);
-        self.heights(stream, layer);
+        self.weights(stream, known, layer);
+        self.fillings(stream, known, layer);
+        self.heights(stream, known, layer);
         let depth = facts.layers[usize::from(layer.layer)].depth;
         self.sea_level(stream, key.depth(), sea_level_grid(depth), &mut layer.sea_level);
         self.marks(stream, &mut layer.marks[..]);
     }
 
-    fn weights(&mut self, stream: &mut Stream<'_>, layer: &mut LayerTile) {
+    fn weights(
+        &mut self,
+        stream: &mut Stream<'_>,
+        known: Option<Known<'_>>,
+        layer: &mut LayerTile,
+    ) {
         if !stream.bit(&mut self.has[0], layer.weights.is_some()) {
             layer.weights = None;
             return;
         }
         let weights = layer.weights.get_or_insert_with(|| Box::new([0; SAMPLES]));
         for at in 0..SAMPLES {
+            if let Some((known, place)) = known.and_then(|k| Some((k, k.place(at)?))) {
+                weights[at] = known.layer.weight(place);
+                continue;
+            }
             let (left, below) = neighbours(&weights[..], at, FULL);
             let (class, expected) = match (i32::from(left), i32::from(below)) {
                 (left, below) if left == below => (usize::from(left % 255 == 0), left),
@@ -230,49 +271,87 @@ impl Contexts {
         }
     }
 
-    fn fillings(&mut self, stream: &mut Stream<'_>, layer: &mut LayerTile) {
+    fn fillings(
+        &mut self,
+        stream: &mut Stream<'_>,
+        known: Option<Known<'_>>,
+        layer: &mut LayerTile,
+    ) {
         if !stream.bit(&mut self.has[1], layer.filled.is_some()) {
             layer.filled = None;
             return;
         }
         let filled = layer.filled.get_or_insert_with(|| Box::new([false; SAMPLES]));
         for at in 0..SAMPLES {
+            if let Some((known, place)) = known.and_then(|k| Some((k, k.place(at)?))) {
+                filled[at] = known.layer.filled.as_ref().is_some_and(|filled| filled[place]);
+                continue;
+            }
             let (left, below) = neighbours(&filled[..], at, false);
             let class = usize::from(left) + 2 * usize::from(below);
             filled[at] = stream.bit(&mut self.filled[class], filled[at]);
         }
     }
 
-    fn heights(&mut self, stream: &mut Stream<'_>, layer: &mut LayerTile) {
+    fn heights(
+        &mut self,
+        stream: &mut Stream<'_>,
+        known: Option<Known<'_>>,
+        layer: &mut LayerTile,
+    ) {
         let LayerTile { quanta, weights, .. } = layer;
         let is_seen = |at: usize| weights.as_ref().is_none_or(|weights| weights[at] > 0);
+        let levels = if let Some(known) = known {
+            for at in 0..SAMPLES {
+                if let Some(place) = known.place(at) {
+                    quanta[at] = if is_seen(at) { known.layer.quanta[place] } else { 0 };
+                }
+            }
+            1
+        } else {
+            self.corners(stream, quanta, &is_seen);
+            PAGE_BITS
+        };
+        let mut sizes = [0_u8; SAMPLES];
+        let mut before = 0;
+        for (level, sides) in (0..levels).rev().flat_map(|level| [(level, false), (level, true)]) {
+            let step = 1 << level;
+            let class = usize::from(level).min(FINE - 1);
+            for (i, j) in new_places(step, sides) {
+                let at = j * PAGE_SIDE + i;
+                if !is_seen(at) {
+                    quanta[at] = 0;
+                    continue;
+                }
+                let guess = guess(quanta, &is_seen, (i, j), (step, sides));
+                let Guess { expected, spread } =
+                    guess.unwrap_or(Guess { expected: before, spread: 4 });
+                let rough = roughness(&sizes, (i, j), step, spread);
+                let left = quanta[at].wrapping_sub(expected);
+                let left = stream.number(&mut self.height[class][rough], left);
+                quanta[at] = expected.wrapping_add(left);
+                before = quanta[at];
+                sizes[at] = u8::try_from(left.unsigned_abs().min(254)).expect("capped") + 1;
+            }
+        }
+    }
+
+    fn corners(
+        &mut self,
+        stream: &mut Stream<'_>,
+        quanta: &mut [i32; SAMPLES],
+        is_seen: &impl Fn(usize) -> bool,
+    ) {
         let last = PAGE_SIDE - 1;
         let mut expected = 0;
         for at in [0, last, last * PAGE_SIDE, last * PAGE_SIDE + last] {
-            let left = quanta[at].wrapping_sub(expected);
-            let left = if is_seen(at) { stream.number(&mut self.corner, left) } else { 0 };
+            if !is_seen(at) {
+                quanta[at] = 0;
+                continue;
+            }
+            let left = stream.number(&mut self.corner, quanta[at].wrapping_sub(expected));
             quanta[at] = expected.wrapping_add(left);
             expected = quanta[at];
-        }
-        let mut sizes = [0_u8; SAMPLES];
-        for level in (0..PAGE_BITS).rev() {
-            let step = 1 << level;
-            let class = usize::from(level).min(FINE - 1);
-            for sides in [false, true] {
-                for (i, j) in new_places(step, sides) {
-                    let at = j * PAGE_SIDE + i;
-                    let Guess { expected, spread } = guess(quanta, (i, j), step, sides);
-                    if !is_seen(at) {
-                        quanta[at] = expected;
-                        continue;
-                    }
-                    let rough = roughness(&sizes, (i, j), step, spread);
-                    let left = quanta[at].wrapping_sub(expected);
-                    let left = stream.number(&mut self.height[class][rough], left);
-                    quanta[at] = expected.wrapping_add(left);
-                    sizes[at] = u8::try_from(left.unsigned_abs().min(254)).expect("capped") + 1;
-                }
-            }
         }
     }
 
@@ -363,14 +442,21 @@ struct Guess {
     spread: u32,
 }
 
-/// From the known samples one and three steps away, along the axes or the diagonals.
-fn guess(quanta: &[i32; SAMPLES], (i, j): (usize, usize), step: usize, sides: bool) -> Guess {
+/// From the known samples one and three steps away, along the axes or the diagonals; `None` where
+/// none of them is seen.
+fn guess(
+    quanta: &[i32; SAMPLES],
+    is_seen: &impl Fn(usize) -> bool,
+    (i, j): (usize, usize),
+    (step, sides): (usize, bool),
+) -> Option<Guess> {
     let ways: [(isize, isize); 2] = if sides { [(1, 0), (0, 1)] } else { [(1, 1), (1, -1)] };
     let step = step.cast_signed();
     let at = |(di, dj): (isize, isize), steps: isize| -> Option<i64> {
         let i = i.checked_add_signed(di * steps * step).filter(|&i| i < PAGE_SIDE)?;
         let j = j.checked_add_signed(dj * steps * step).filter(|&j| j < PAGE_SIDE)?;
-        Some(i64::from(quanta[j * PAGE_SIDE + i]))
+        let at = j * PAGE_SIDE + i;
+        is_seen(at).then(|| i64::from(quanta[at]))
     };
     let [one, other] = ways.map(|way| {
         let (before, after) = (at(way, -1)?, at(way, 1)?);
@@ -384,15 +470,17 @@ fn guess(quanta: &[i32; SAMPLES], (i, j): (usize, usize), step: usize, sides: bo
         let most = i64::from(i32::MAX / 2);
         i32::try_from(value.clamp(-most, most)).expect("clamped")
     };
-    match (one, other) {
+    let (expected, spread) = match (one, other) {
         (Some((a, rise)), Some((b, run))) => {
-            let spread = a.abs_diff(b) + rise / 4 + run / 4;
-            let spread = u32::try_from(spread.min(1 << 20)).expect("capped");
-            Guess { expected: cut((a + b) >> 1), spread }
+            (cut((a + b) >> 1), a.abs_diff(b) + rise / 4 + run / 4)
         }
-        (Some((a, _)), None) | (None, Some((a, _))) => Guess { expected: cut(a), spread: 4 },
-        (None, None) => Guess { expected: 0, spread: 4 },
-    }
+        (Some((a, _)), None) | (None, Some((a, _))) => (cut(a), 4),
+        (None, None) => {
+            let near = ways.into_iter().flat_map(|way| [at(way, -1), at(way, 1)]);
+            (cut(near.flatten().next()?), 4)
+        }
+    };
+    Some(Guess { expected, spread: u32::try_from(spread.min(1 << 20)).expect("capped") })
 }
 
 /// The class of a sample by the sizes of what was left over around it.
@@ -475,18 +563,42 @@ mod tests {
     fn tiles_come_back_but_for_samples_without_weight() {
         for (key, noise) in [(PageKey::new(0, 4, 3, 9), 5), (PageKey::new(3, 12, 77, 4000), 3000)] {
             let tile = tile(key, noise);
-            let bytes = encode(&tile, &facts());
-            let mut back = decode(&bytes, key, &facts()).unwrap();
+            let bytes = encode(&tile, None, &facts());
+            let mut back = decode(&bytes, key, None, &facts()).unwrap();
             for (layer, original) in back.layers.iter_mut().zip(&tile.layers) {
                 for at in (0..SAMPLES).filter(|&at| original.weight(at) == 0) {
+                    assert_eq!(layer.quanta[at], 0);
                     layer.quanta[at] = original.quanta[at];
                 }
             }
             assert_eq!(back, tile);
             // Decoded once more, what has no weight is the same too.
-            let again = decode(&encode(&back, &facts()), key, &facts()).unwrap();
-            assert_eq!(decode(&bytes, key, &facts()).unwrap(), again);
+            let again = decode(&encode(&back, None, &facts()), key, None, &facts()).unwrap();
+            assert_eq!(decode(&bytes, key, None, &facts()).unwrap(), again);
         }
+    }
+
+    #[test]
+    fn a_tile_takes_every_second_sample_from_its_parent() {
+        let (parent, child) = (tile(PageKey::new(0, 6, 10, 11), 50), PageKey::new(0, 7, 21, 22));
+        let mut fine = tile(child, 50);
+        let (above, below) = (&parent.layers[0], &mut fine.layers[0]);
+        let known = Known::of(Some(&parent), child, 1).unwrap();
+        let places: Vec<_> = (0..SAMPLES).filter_map(|at| Some((at, known.place(at)?))).collect();
+        for (at, place) in places {
+            below.quanta[at] = above.quanta[place];
+            below.weights.as_mut().unwrap()[at] = above.weight(place);
+        }
+        for at in 0..SAMPLES {
+            if below.weight(at) == 0 {
+                below.quanta[at] = 0;
+            }
+        }
+        let bytes = encode(&parent, None, &facts());
+        let parent = decode(&bytes, parent.key, None, &facts()).unwrap();
+        let bytes = encode(&fine, Some(&parent), &facts());
+        assert_eq!(decode(&bytes, child, Some(&parent), &facts()), Ok(fine.clone()));
+        assert!(bytes.len() < encode(&fine, None, &facts()).len() * 9 / 10);
     }
 
     #[test]
@@ -494,24 +606,24 @@ mod tests {
         let key = PageKey::new(1, 12, 5, 6);
         let mut tile = tile(key, 1);
         tile.layers[0].weights = None;
-        let bytes = encode(&tile, &facts()).len();
+        let bytes = encode(&tile, None, &facts()).len();
         assert!(bytes < SAMPLES / 8, "{bytes}");
     }
 
     #[test]
     fn damaged_bytes_are_told_apart_from_foreign_ones() {
         let key = PageKey::new(3, 12, 77, 4000);
-        let bytes = encode(&tile(key, 9), &facts());
-        assert_eq!(decode(&[], key, &facts()), Err(TileFault::Short { found: 0 }));
-        assert_eq!(decode(&bytes[..40], key, &facts()), Err(TileFault::Damaged));
-        assert_eq!(decode(&bytes, PageKey::root(0), &facts()), Err(TileFault::Damaged));
+        let bytes = encode(&tile(key, 9), None, &facts());
+        assert_eq!(decode(&[], key, None, &facts()), Err(TileFault::Short { found: 0 }));
+        assert_eq!(decode(&bytes[..40], key, None, &facts()), Err(TileFault::Damaged));
+        assert_eq!(decode(&bytes, PageKey::root(0), None, &facts()), Err(TileFault::Damaged));
         let mut other = bytes.clone();
         other[0] = 7;
-        assert_eq!(decode(&other, key, &facts()), Err(TileFault::Version { found: 7 }));
+        assert_eq!(decode(&other, key, None, &facts()), Err(TileFault::Version { found: 7 }));
         for at in 1..bytes.len() {
             let mut flipped = bytes.clone();
             flipped[at] ^= 1 << (at % 8);
-            assert_eq!(decode(&flipped, key, &facts()), Err(TileFault::Damaged), "byte {at}");
+            assert_eq!(decode(&flipped, key, None, &facts()), Err(TileFault::Damaged), "byte {at}");
         }
     }
 
@@ -525,7 +637,7 @@ mod tests {
             bytes[0] = VERSION;
             let sum = check_sum(key, &bytes);
             bytes.extend(sum.to_le_bytes());
-            if let Ok(tile) = decode(&bytes, key, &facts()) {
+            if let Ok(tile) = decode(&bytes, key, None, &facts()) {
                 assert!(tile.layers.iter().all(|layer| layer.sea_level.len() <= SAMPLES));
             }
         }

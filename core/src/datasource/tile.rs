@@ -105,10 +105,13 @@ struct Spot {
     parts: i64,
 }
 
-/// Metres of a logarithmic bound: 0, then from 1 mm on 7 % more each, to 18 km.
+/// The greatest logarithmic bound.
+pub const BOUND_MAX: u8 = 91;
+
+/// Metres of a logarithmic bound: 0, then from 1 mm on 30 % more each, to 20 000 km.
 pub fn metres_of(bound: u8) -> f64 {
     const LEAST_M: f64 = 1e-3;
-    const MORE: f64 = 1.068;
+    const MORE: f64 = 1.3;
     let power = |exponent: u32| {
         let (mut result, mut factor, mut left) = (1.0, MORE, exponent);
         while left > 0 {
@@ -122,9 +125,9 @@ pub fn metres_of(bound: u8) -> f64 {
     if bound == 0 { 0.0 } else { LEAST_M * power(u32::from(bound) - 1) }
 }
 
-/// The least bound that is not below `metres`; the greatest there is above 18 km.
+/// The least bound that is not below `metres`.
 pub fn bound_of(metres: f64) -> u8 {
-    let (mut below, mut enough) = (0_u8, 255_u8);
+    let (mut below, mut enough) = (0_u8, BOUND_MAX);
     if metres <= 0.0 {
         return 0;
     }
@@ -300,13 +303,13 @@ mod tests {
     #[test]
     fn bounds_are_the_least_that_hold() {
         assert_eq!((metres_of(0), bound_of(0.0), bound_of(-1.0)), (0.0, 0, 0));
-        for bound in 1..=254 {
+        for bound in 1..BOUND_MAX {
             let metres = metres_of(bound);
             assert_eq!(bound_of(metres), bound);
             assert_eq!(bound_of(metres * 1.001), bound + 1);
-            assert!(metres_of(bound + 1) / metres < 1.0681);
+            assert!(metres_of(bound + 1) / metres < 1.3001);
         }
-        assert!(metres_of(255) > 17_000.0);
+        assert!(metres_of(BOUND_MAX) > 1.7e7);
     }
 
     fn slanted(key: PageKey, layer_depth: u8) -> LayerTile {

@@ -10,7 +10,9 @@
 //! where its vertical meets the plane of the triangle around it. On a sphere verticals through an
 //! edge of the lattice lie in one plane, so that the surface has no step. On an ellipsoid of
 //! flattening f they leave the edge, e long, by about f·e²/(8R), so that there is a step of that
-//! times the difference in slope of both triangles: `tests/ground.rs` measures it.
+//! times the difference in slope of both triangles. In the Earth's mountains it is below 1 mm from
+//! level 20 on (edges of 24 km), below 0.05 mm from 26 and below 1 µm from 33;
+//! `tests/ground.rs` measures it.
 //!
 //! **Purity.** `Query::Exact` is a function of body, sea, page and place alone: no thread, order
 //! of arrival, page elsewhere or finer page can change a bit. Every answer is the same on every
@@ -66,7 +68,16 @@ pub struct Ground {
 struct Step<'a> {
     normal: DVec3,
     place: Place,
-    choice: Option<Choice<'a>>,
+    /// Empty until it is looked for, and where nothing is resident.
+    found: Option<Found<'a>>,
+}
+
+/// What answers, and the triangle there.
+#[derive(Clone, Copy)]
+struct Found<'a> {
+    page: &'a Resident,
+    coarser: bool,
+    triangle: (Cell, Corners, [f64; 3]),
 }
 
 impl Ground {
@@ -137,14 +148,12 @@ impl Ground {
         let mut steps: [Option<Step<'a>>; BATCH] = [None; BATCH];
         for (step, &at) in steps.iter_mut().zip(at).filter(|(_, at)| is_place(**at)) {
             let normal = normal_of(at);
-            *step = Some(Step { normal, place: Place::of(normal), choice: None });
+            *step = Some(Step { normal, place: Place::of(normal), found: None });
         }
         let mut touched = 0;
         for step in steps.iter_mut().flatten() {
-            step.choice = choose(step.place, query, &mut |key| recent.find(key));
-            if let Some(Choice { page, level, .. }) = step.choice {
-                touched ^= page.touch(step.place.triangle(level).0);
-            }
+            step.found = found(step.place, query, &mut |key| recent.find(key));
+            touched ^= step.found.map_or(0, |found| found.page.touch(found.triangle.0));
         }
         core::hint::black_box(touched);
         for (answer, step) in answers.iter_mut().zip(&steps) {
@@ -153,9 +162,9 @@ impl Ground {
     }
 
     #[inline(always)]
-    fn answer(&self, Step { normal, place, choice }: Step<'_>) -> Answer {
-        let Some(Choice { page, level, coarser }) = choice else { return Answer::NotReady };
-        let reading = self.shape.read(page, place, level);
+    fn answer(&self, Step { normal, found, .. }: Step<'_>) -> Answer {
+        let Some(Found { page, coarser, triangle }) = found else { return Answer::NotReady };
+        let reading = self.shape.read(page, triangle);
         Answer::of(self.shape.meet(&reading, normal), coarser)
     }
 
@@ -176,9 +185,20 @@ impl Ground {
 
     fn height_along(&self, normal: DVec3, query: Query) -> Answer {
         let place = Place::of(normal);
-        let choice = choose(place, query, &mut |key| self.map.find(key));
-        self.answer(Step { normal, place, choice })
+        let found = found(place, query, &mut |key| self.map.find(key));
+        self.answer(Step { normal, place, found })
     }
+}
+
+/// What answers at a place.
+#[inline]
+fn found<'a>(
+    place: Place,
+    query: Query,
+    find: &mut impl FnMut(PageKey) -> Option<&'a Resident>,
+) -> Option<Found<'a>> {
+    let Choice { page, level, coarser } = choose(place, query, find)?;
+    Some(Found { page, coarser, triangle: place.triangle(level) })
 }
 
 /// The ellipsoid's outward normal at a place.

@@ -6,7 +6,7 @@
 //! Not here: choosing page and level (`choose`), which triangle (`place`).
 
 use super::answer::Height;
-use super::place::{Cell, Corners, LEVEL_BOUNDED, Place, fold_f64};
+use super::place::{Cell, Corners, LEVEL_BOUNDED, fold_f64};
 use super::resident::Resident;
 use crate::geodesy::Ellipsoid;
 use crate::lattice::RADIUS;
@@ -101,10 +101,13 @@ impl Shape {
         page.errors(x, y).of_level(cell.level)
     }
 
-    /// Reads from `page` what the height of `place` at `level` needs.
+    /// Reads from `page` what the height in a triangle needs, at the place of these weights.
     #[inline(always)]
-    pub fn read(&self, page: &Resident, place: Place, level: u8) -> Reading {
-        let (cell, corners, weights) = place.triangle(level);
+    pub fn read(
+        &self,
+        page: &Resident,
+        (cell, corners, weights): (Cell, Corners, [f64; 3]),
+    ) -> Reading {
         let key = page.page.key;
         let at = corners.map(|corner| cell.sample(key, corner));
         let mean = |of: [f64; 3]| of[0] * weights[0] + of[1] * weights[1] + of[2] * weights[2];
@@ -115,7 +118,7 @@ impl Shape {
             height_m: 0.0,
             sea_level_m: 0.0,
             normal: DVec3::ZERO,
-            level,
+            level: cell.level,
             bound_m: self.bound_m(page, &cell),
             origin: crate::datasource::page::Origin::Procedural,
             water,

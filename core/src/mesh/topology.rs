@@ -19,23 +19,25 @@ pub fn vertex_index(row: u32, column: u32) -> u32 {
 
 /// Indices of the 2^k triangles, three each, counter-clockwise like the patch's own corners
 /// (apex, hypotenuse start, hypotenuse end).
+///
+/// They are those that halving the patch k times makes, as the mesh itself would: so what is drawn
+/// is the surface of one lattice level, whatever the patch depth.
 pub fn indices(patch_depth: u8) -> Vec<u32> {
     let n = segments(patch_depth);
     let mut list = Vec::with_capacity(3 << patch_depth);
-    for row in 0..n {
-        for column in 0..=row {
-            let [above, left, right] = [
-                vertex_index(row, column),
-                vertex_index(row + 1, column),
-                vertex_index(row + 1, column + 1),
-            ];
-            list.extend([above, left, right]);
-            if column < row {
-                list.extend([above, right, vertex_index(row, column + 1)]);
-            }
-        }
-    }
+    halve([(0, 0), (n, 0), (n, n)], patch_depth, &mut list);
     list
+}
+
+/// Cuts a triangle of (row, column)s from its apex to the middle of its hypotenuse, some times.
+fn halve([apex, start, end]: [(u32, u32); 3], times: u8, list: &mut Vec<u32>) {
+    if times == 0 {
+        list.extend([apex, start, end].map(|(row, column)| vertex_index(row, column)));
+        return;
+    }
+    let middle = (u32::midpoint(start.0, end.0), u32::midpoint(start.1, end.1));
+    halve([middle, apex, start], times - 1, list);
+    halve([middle, end, apex], times - 1, list);
 }
 
 #[cfg(test)]

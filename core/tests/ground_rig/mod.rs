@@ -84,7 +84,12 @@ pub fn sea_level_m(normal: DVec3) -> f32 {
 
 /// The same page with a survey: sea level, and origins in stripes.
 pub fn surveyed(page: &Page) -> Arc<Page> {
-    let mut survey = Survey { sea_level_m: [0.0; SAMPLES], origin: [Origin::Measured; SAMPLES] };
+    let mut survey = Survey {
+        sea_level_m: [0.0; SAMPLES],
+        // No two places of the geoid below are farther apart.
+        sea_level_variation_m: 65.0,
+        origin: [Origin::Measured; SAMPLES],
+    };
     for at in 0..SAMPLES {
         let point = page.key.sample(at % PAGE_SIDE, at / PAGE_SIDE);
         survey.sea_level_m[at] = sea_level_m(normal_of(point));

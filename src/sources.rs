@@ -1,0 +1,309 @@
+//! Where a scene's pages come from: its open archives, their tiles, the generator.
+//!
+//! In:    the settings of a scene; page keys.
+//! Out:   pages; which level the data has at a place; why there is no page.
+//! Keeps: open archives, decoded tiles of bounded size, shared by all threads.
+//! Not here: threads (`loader`), reading archives (`overfly_archive`), heights (`overfly_core`).
+
+use crate::archive::{Archive, ArchiveError, Location, OpenOptions};
+use crate::core::datasource::codec::{TileFault, decode};
+use crate::core::datasource::compose::Need;
+use crate::core::datasource::generate::Generator;
+use crate::core::datasource::key::PAGE_BITS;
+use crate::core::datasource::page::SAMPLES;
+use crate::core::datasource::tile::{FULL, LayerTile, Tile};
+use crate::core::datasource::{Page, PageKey};
+use crate::core::geodesy::Ellipsoid;
+use crate::core::ground::{Place, Query};
+use crate::core::settings::SceneSettings;
+use lru::LruCache;
+use parking_lot::Mutex;
+use std::fmt;
+use std::sync::Arc;
+
+/// Decoded tiles are kept up to this size together.
+const TILES_BYTES_MAX: usize = 64 << 20;
+
+/// Bodies whose radii and flattening differ by no more than this share are the same.
+const BODY_TOLERANCE: f64 = 1e-9;
+
+/// Everything that the pages of one scene are made from.
+pub struct Sources {
+    generator: Generator,
+    archives: Vec<Archive>,
+    tiles: Mutex<Tiles>,
+    body: Ellipsoid,
+    sea: bool,
+}
+
+/// Decoded tiles, and that there is none: the ones used last.
+struct Tiles {
+    recent: LruCache<(usize, PageKey), Option<Arc<Tile>>>,
+    bytes: usize,
+}
+
+/// Why a source cannot be used, or a page cannot be made.
+#[derive(Debug)]
+pub enum SourceError {
+    /// An archive cannot be opened, or a tile cannot be had.
+    Archive(ArchiveError),
+    /// An archive is of another body than the scene.
+    Body {
+        /// Path or address.
+        archive: String,
+        /// The archive's body, as it calls it.
+        found_name: String,
+        /// The archive's body.
+        found: Ellipsoid,
+        /// The scene's.
+        wanted: Ellipsoid,
+    },
+    /// A tile arrived and is none.
+    Tile {
+        /// Path or address.
+        archive: String,
+        /// Which tile.
+        key: PageKey,
+        /// What is wrong with it.
+        fault: TileFault,
+    },
+    /// Making the page panicked: a bug of ours.
+    Panic {
+        /// Which page.
+        key: PageKey,
+        /// What the panic said.
+        message: String,
+    },
+}
+
+impl SourceError {
+    /// Path or address of the archive that is to blame, if one is.
+    pub fn archive(&self) -> Option<&str> {
+        match self {
+            Self::Archive(ArchiveError { archive, .. })
+            | Self::Body { archive, .. }
+            | Self::Tile { archive, .. } => Some(archive),
+            Self::Panic { .. } => None,
+        }
+    }
+}
+
+impl fmt::Display for SourceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Archive(error) => error.fmt(f),
+            Self::Body { archive, found_name, found, wanted } => write!(
+                f,
+                "archive {archive}: it is of the body {found_name} (a = {:?} m, f = {:?}), but the \
+                 scene's body has a = {:?} m, f = {:?}",
+                found.a_m, found.f, wanted.a_m, wanted.f
+            ),
+            Self::Tile { archive, key, fault } => {
+                let (z, x, y) = key.zxy();
+                write!(f, "archive {archive}: tile {z}/{x}/{y}: {fault}")
+            }
+            Self::Panic { key, message } => write!(f, "page {key:?} cannot be made: {message}"),
+        }
+    }
+}
+
+impl std::error::Error for SourceError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Archive(error) => error.source(),
+            Self::Tile { fault, .. } => Some(fault),
+            Self::Body { .. } | Self::Panic { .. } => None,
+        }
+    }
+}
+
+impl Sources {
+    /// Opens the archives of a scene; `options` are for those on servers. Blocks.
+    ///
+    /// # Errors
+    /// An archive that cannot be opened, or is of another body than the scene.
+    pub fn open(settings: &SceneSettings, options: &OpenOptions) -> Result<Self, SourceError> {
+        let body = settings.body;
+        let archives: Vec<_> =
+            settings.archives().map(|name| open(name, &body, options)).collect::<Result<_, _>>()?;
+        let facts = archives.iter().map(|archive| archive.facts().clone()).collect();
+        Ok(Self {
+            generator: Generator::with_archives(settings, facts),
+            archives,
+            tiles: Mutex::new(Tiles { recent: LruCache::unbounded(), bytes: 0 }),
+            body,
+            sea: settings.sea,
+        })
+    }
+
+    /// The generator that turns tiles into pages.
+    pub fn generator(&self) -> &Generator {
+        &self.generator
+    }
+
+    /// The open archives, in the scene's order: names, facts and how they have fared.
+    pub fn archives(&self) -> &[Archive] {
+        &self.archives
+    }
+
+    /// The scene's body.
+    pub fn body(&self) -> &Ellipsoid {
+        &self.body
+    }
+
+    /// Whether water covers the ground below sea level.
+    pub fn sea(&self) -> bool {
+        self.sea
+    }
+
+    /// Hashes of what the archives hold, in the scene's order.
+    pub fn contents(&self) -> Vec<u64> {
+        self.archives.iter().map(|archive| archive.facts().content).collect()
+    }
+
+    /// Makes a page. Blocks while tiles are read.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn page(&self, key: PageKey) -> Result<Arc<Page>, SourceError> {
+        if self.archives.is_empty() {
+            return Ok(self.generator.page(key));
+        }
+        let needs = self.generator.needs(key);
+        let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
+        Ok(self.generator.page_from(key, &tiles.collect::<Result<Vec<_>, _>>()?))
+    }
+
+    /// Level of the finest data that is seen at a place; `None` where no archive has any.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn data_level(&self, place: Place) -> Result<Option<u8>, SourceError> {
+        let mut finest = None;
+        for (archive, open) in self.archives.iter().enumerate() {
+            for (index, layer) in open.facts().layers.iter().enumerate().rev() {
+                let [least, most] = self.weights(archive, index, place, layer.depth)?;
+                if most > 0 {
+                    finest = finest.max(Some(level_of(layer.depth)));
+                }
+                if least == FULL {
+                    return Ok(finest);
+                }
+            }
+        }
+        Ok(finest)
+    }
+
+    /// Least and greatest weight of a layer at the corners of the last triangle around a place.
+    fn weights(
+        &self,
+        archive: usize,
+        index: usize,
+        place: Place,
+        depth: u8,
+    ) -> Result<[u8; 2], SourceError> {
+        let key = place.page(depth);
+        let tile = self.tile(archive, key)?;
+        let of_layer = |layer: &&LayerTile| usize::from(layer.layer) == index;
+        let Some(layer) = tile.as_ref().and_then(|tile| tile.layers.iter().find(of_layer)) else {
+            return Ok([0, 0]);
+        };
+        let (cell, corners, _) = place.triangle(level_of(depth));
+        let [a, b, c] = corners.map(|corner| layer.weight(cell.sample(key, corner)));
+        Ok([a.min(b).min(c), a.max(b).max(c)])
+    }
+
+    /// The level at which samples of the procedural planet are about 1 m apart.
+    pub fn procedural_level(&self) -> u8 {
+        let side_m = core::f64::consts::FRAC_PI_2 * self.body.a_m;
+        let mut level = level_of(0);
+        while level < crate::core::ground::LEVEL_MAX
+            && side_m / f64::from(1_u32 << (level / 2)) > core::f64::consts::SQRT_2
+        {
+            level += 2;
+        }
+        level
+    }
+
+    /// What asks for the best there is at a place: the finest data, or the procedural planet.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn best(&self, place: Place) -> Result<Query, SourceError> {
+        let level = self.data_level(place)?;
+        Ok(Query::Exact(level.unwrap_or_else(|| self.procedural_level())))
+    }
+
+    /// From now on archives on servers give no tile: whoever waits for one gives up. For a host
+    /// that wants to end while a server is silent.
+    pub fn close(&self) {
+        self.archives.iter().for_each(Archive::close);
+    }
+
+    fn tile(&self, archive: usize, key: PageKey) -> Result<Option<Arc<Tile>>, SourceError> {
+        if let Some(known) = self.tiles.lock().recent.get(&(archive, key)) {
+            return Ok(known.clone());
+        }
+        // Outside the lock: two threads may read the same tile, and none waits for another's.
+        let open = &self.archives[archive];
+        let bytes = open.tile(key).map_err(SourceError::Archive)?;
+        let tile = match bytes {
+            None => None,
+            Some(bytes) => {
+                // What the parent holds already is not in the bytes.
+                let parent = key.parent().map(|parent| self.tile(archive, parent)).transpose()?;
+                let tile = decode(&bytes, key, parent.flatten().as_deref(), open.facts());
+                let damaged = |fault| {
+                    let archive = open.name().to_owned();
+                    SourceError::Tile { archive, key, fault }
+                };
+                Some(Arc::new(tile.map_err(damaged)?))
+            }
+        };
+        self.tiles.lock().put((archive, key), tile.clone());
+        Ok(tile)
+    }
+}
+
+impl Tiles {
+    fn put(&mut self, key: (usize, PageKey), tile: Option<Arc<Tile>>) {
+        self.bytes += bytes_of(tile.as_deref());
+        if let Some(old) = self.recent.put(key, tile) {
+            self.bytes -= bytes_of(old.as_deref());
+        }
+        while self.bytes > TILES_BYTES_MAX
+            && let Some((_, old)) = self.recent.pop_lru()
+        {
+            self.bytes -= bytes_of(old.as_deref());
+        }
+    }
+}
+
+/// The lattice level of data whose last pages have this depth: the finest that these serve.
+pub fn level_of(depth: u8) -> u8 {
+    2 * (PAGE_BITS + depth)
+}
+
+/// Bytes that a decoded tile takes, or the note that there is none.
+fn bytes_of(tile: Option<&Tile>) -> usize {
+    const NOTE: usize = 128;
+    let layer = |layer: &LayerTile| {
+        let planes = 4 + usize::from(layer.weights.is_some()) + usize::from(layer.filled.is_some());
+        size_of::<LayerTile>()
+            + planes * SAMPLES
+            + size_of_val(&*layer.marks)
+            + size_of_val(&layer.sea_level[..])
+    };
+    NOTE + tile.map_or(0, |tile| tile.layers.iter().map(layer).sum())
+}
+
+fn open(name: &str, wanted: &Ellipsoid, options: &OpenOptions) -> Result<Archive, SourceError> {
+    let archive = Archive::open(&Location::parse(name), options).map_err(SourceError::Archive)?;
+    let found = archive.facts().body;
+    let like = |a: f64, b: f64| (a - b).abs() <= BODY_TOLERANCE * a.abs().max(b.abs());
+    if like(found.a_m, wanted.a_m) && like(found.f, wanted.f) {
+        return Ok(archive);
+    }
+    let found_name = archive.facts().body_name.clone();
+    Err(SourceError::Body { archive: name.to_owned(), found_name, found, wanted: *wanted })
+}
