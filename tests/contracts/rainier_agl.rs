@@ -34,7 +34,7 @@ fn ingest(data: &Path, output: PathBuf) {
         output,
         body: ("Earth".into(), Ellipsoid::WGS84),
         datum: Datum::Egm96,
-        geoid: None,
+        geoid: Some(dem.join("egm96_15.gtx")),
         blend_m: None,
         level_max: None,
     };

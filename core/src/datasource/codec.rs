@@ -190,7 +190,11 @@ impl<'a> Known<'a> {
         let parent = parent.filter(|parent| key.parent() == Some(parent.key))?;
         let half = (PAGE_SIDE - 1) / 2;
         let (column, row) = (key.child_index() % 2 * half, key.child_index() / 2 * half);
-        let layer = parent.layers.iter().find(|plane| plane.layer == layer)?;
+        // One without any weight holds nothing: it may not even have been looked at.
+        let holds = |plane: &&LayerTile| {
+            plane.weights.as_ref().is_none_or(|weights| weights.iter().any(|&weight| weight > 0))
+        };
+        let layer = parent.layers.iter().find(|plane| plane.layer == layer).filter(holds)?;
         Some(Self { layer, first: row * PAGE_SIDE + column })
     }
 
