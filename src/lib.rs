@@ -298,13 +298,18 @@ impl Overfly {
         let (surveyor, failed) = (RefCell::new(surveyor), RefCell::new(None));
         let height_m = |at| {
             let mut surveyor = surveyor.borrow_mut();
-            ground_height_m(&mut surveyor, at).unwrap_or_else(|error| {
-                let coarser = surveyor.coarser(at, Query::BestResident).found();
-                if coarser.is_none() {
+            let error = match ground_height_m(&mut surveyor, at) {
+                Ok(height_m) => return height_m,
+                Err(error) => error,
+            };
+            let coarser = surveyor.coarser(at, Query::BestResident).found();
+            coarser.map_or_else(
+                || {
                     failed.borrow_mut().get_or_insert(error);
-                }
-                coarser.map_or(0.0, |ground| ground.height_m)
-            })
+                    0.0
+                },
+                |ground| ground.height_m,
+            )
         };
         let flight = crate::replay::flight(name, body, &height_m);
         match (failed.into_inner(), flight) {

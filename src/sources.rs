@@ -180,15 +180,15 @@ impl Sources {
     /// A tile cannot be had or is damaged.
     pub fn data_level(&self, place: Place) -> Result<Option<u8>, SourceError> {
         let mut finest = None;
-        for (archive, open) in self.archives.iter().enumerate() {
-            for (index, layer) in open.facts().layers.iter().enumerate().rev() {
-                let [least, most] = self.weights(archive, index, place, layer.depth)?;
-                if most > 0 {
-                    finest = finest.max(Some(level_of(layer.depth)));
-                }
-                if least == FULL {
-                    return Ok(finest);
-                }
+        let layers = self.archives.iter().enumerate().flat_map(|(archive, open)| {
+            let layers = open.facts().layers.iter().enumerate().rev();
+            layers.map(move |(index, layer)| (archive, index, layer.depth))
+        });
+        for (archive, index, depth) in layers {
+            let [least, most] = self.weights((archive, index), place, depth)?;
+            finest = if most > 0 { finest.max(Some(level_of(depth))) } else { finest };
+            if least == FULL {
+                break;
             }
         }
         Ok(finest)
@@ -197,8 +197,7 @@ impl Sources {
     /// Least and greatest weight of a layer at the corners of the last triangle around a place.
     fn weights(
         &self,
-        archive: usize,
-        index: usize,
+        (archive, index): (usize, usize),
         place: Place,
         depth: u8,
     ) -> Result<[u8; 2], SourceError> {

@@ -277,11 +277,9 @@ impl Layer<'_> {
         for at in 0..count {
             let point = square.point(self.grid, at % square.side, at / square.side);
             let mixture = self.mixture(lon_lat_of(normal_of(point)), &mut stands);
-            if let Some(mixture) = &mixture {
-                for &(index, _) in &mixture.shares {
-                    let stand = stands[index].expect("a share has a stand");
-                    spans[index].add(stand.place, &self.sheets[index].raster.grid);
-                }
+            for &(index, _) in mixture.iter().flat_map(|mixture| &mixture.shares) {
+                let stand = stands[index].expect("a share has a stand");
+                spans[index].add(stand.place, &self.sheets[index].raster.grid);
             }
             mixtures.push(mixture.map(|mixture| {
                 let place = |index: usize| stands[index].expect("a share has a stand").place;
@@ -330,19 +328,7 @@ impl Layer<'_> {
     fn gather(&self, index: usize, window: &Window, square: &Square, out: &mut Vec<Posting>) {
         let grid = &self.sheets[index].raster.grid;
         let alone = self.sheets.len() == 1;
-        let columns =
-            if grid.wraps { window.width.min(grid.columns as usize) } else { window.width };
-        let meridians: Vec<_> = (0..columns)
-            .map(|i| {
-                let column = window.first[0] + i64::try_from(i).expect("small");
-                let lon = grid.lon_lat(column as f64, 0.0)[0];
-                (
-                    (0..i64::from(grid.columns)).contains(&column) || grid.wraps,
-                    lon,
-                    [cos(lon), sin(lon)],
-                )
-            })
-            .collect();
+        let meridians = window.meridians(grid);
         for j in 0..window.height {
             let row = window.first[1] + i64::try_from(j).expect("small");
             if !(0..i64::from(grid.rows)).contains(&row) {
@@ -350,13 +336,15 @@ impl Layer<'_> {
             }
             let lat = grid.lon_lat(0.0, row as f64)[1];
             let (sin_lat, cos_lat) = (sin(lat), cos(lat));
-            for (i, &(known, lon, [cos_lon, sin_lon])) in meridians.iter().enumerate() {
-                let at = j * window.width + i;
-                if !known || window.void[at] || !(alone || self.shows(index, [lon, lat])) {
-                    continue;
-                }
+            let place = |meridian: &Meridian| j * window.width + meridian.column;
+            let is_seen = |meridian: &&Meridian| {
+                let whole = !window.void[place(meridian)];
+                whole && (alone || self.shows(index, [meridian.lon_rad, lat]))
+            };
+            for meridian in meridians.iter().filter(is_seen) {
+                let (cos_lon, sin_lon) = (meridian.cos, meridian.sin);
                 let normal = DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
-                let height = fine(f64::from(window.heights_m[at]));
+                let height = fine(f64::from(window.heights_m[place(meridian)]));
                 out.extend(
                     square.places(self.grid, normal).map(|place| posting(square, place, height)),
                 );
@@ -393,6 +381,15 @@ fn fine(height_m: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "heights are below 1e6 m")]
     let fine = (height_m * FINE).round() as i64;
     fine
+}
+
+/// A column of a window that its raster has.
+struct Meridian {
+    /// Which of the window's.
+    column: usize,
+    lon_rad: f64,
+    cos: f64,
+    sin: f64,
 }
 
 /// The postings that points of a block lie among.
@@ -436,6 +433,18 @@ impl Span {
 }
 
 impl Window {
+    /// Its columns, once round the body at most.
+    fn meridians(&self, grid: &Grid) -> Vec<Meridian> {
+        let round = if grid.wraps { grid.columns as usize } else { self.width };
+        let known = |column: i64| grid.wraps || (0..i64::from(grid.columns)).contains(&column);
+        let columns = (self.first[0]..).zip(0..self.width.min(round));
+        let meridian = |(at, column): (i64, usize)| {
+            let lon_rad = grid.lon_lat(at as f64, 0.0)[0];
+            Meridian { column, lon_rad, cos: cos(lon_rad), sin: sin(lon_rad) }
+        };
+        columns.filter(|&(at, _)| known(at)).map(meridian).collect()
+    }
+
     fn cell(&self, place: [f64; 2]) -> ([usize; 2], [f64; 2]) {
         let limits = [self.width, self.height];
         let mut cell = [0; 2];
@@ -483,28 +492,27 @@ mod tests {
     use super::*;
     use overfly_core::lattice::RADIUS;
 
+    /// Neighbours lie side by side, and the place between them is found there.
+    fn assert_cell_is_small(square: &Square, grid: u8, i: usize, j: usize) {
+        let at = |i, j| square.point(grid, i, j).as_dvec3();
+        let step = f64::from(RADIUS >> grid);
+        assert!((at(i, j) - at(i + 1, j)).length() < 2.5 * step, "{square:?} {i} {j}");
+        assert!((at(i, j) - at(i, j + 1)).length() < 2.5 * step, "{square:?} {i} {j}");
+        let middle = normal_of(((at(i, j) + at(i + 1, j)) / 2.0).as_ivec3());
+        let found = square
+            .places(grid, middle)
+            .any(|[x, y]| (x - i as f64 - 0.5).abs() < 1e-3 && (y - j as f64).abs() < 1e-3);
+        assert!(found || j == 0, "{square:?} {i} {j}");
+    }
+
     #[test]
     fn reflected_points_lie_beside_the_border() {
         let (grid, side) = (8, 9);
         for quadrant in 0..4 {
             for first in [[-4, 100], [100, -4], [252, 30], [30, 252], [-4, -4], [252, 252]] {
                 let square = Square { quadrant, first, side };
-                for j in 0..side - 1 {
-                    for i in 0..side - 1 {
-                        let at = |i, j| square.point(grid, i, j).as_dvec3();
-                        let step = f64::from(RADIUS >> grid);
-                        assert!(
-                            (at(i, j) - at(i + 1, j)).length() < 2.5 * step,
-                            "{first:?} {i} {j}"
-                        );
-                        assert!((at(i, j) - at(i, j + 1)).length() < 2.5 * step);
-                        let middle = normal_of(((at(i, j) + at(i + 1, j)) / 2.0).as_ivec3());
-                        let found = square.places(grid, middle).any(|[x, y]| {
-                            (x - i as f64 - 0.5).abs() < 1e-3 && (y - j as f64).abs() < 1e-3
-                        });
-                        assert!(found || j == 0, "{quadrant} {first:?} {i} {j}");
-                    }
-                }
+                let cells = (0..side - 1).flat_map(|j| (0..side - 1).map(move |i| (i, j)));
+                cells.for_each(|(i, j)| assert_cell_is_small(&square, grid, i, j));
             }
         }
     }

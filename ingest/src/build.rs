@@ -351,11 +351,7 @@ impl Desk<'_> {
             for ((_, key, _), (bytes, tile_m)) in batch.iter().zip(tiles?) {
                 add(&mut writer, *key, &bytes).map_err(refused)?;
                 content.add(key.bits());
-                bytes.chunks(8).for_each(|part| {
-                    let mut word = [0; 8];
-                    word[..part.len()].copy_from_slice(part);
-                    content.add(u64::from_le_bytes(word));
-                });
+                digest(&mut content, &bytes);
                 range_m = [range_m[0].min(tile_m[0]), range_m[1].max(tile_m[1])];
             }
             done += batch.len() as u64;
@@ -486,14 +482,15 @@ impl Desk<'_> {
         let mut levels: Vec<Option<i32>> = vec![None; side * side];
         let samples = (PAGE_SIDE - 1) / (side - 1);
         let along = |at: usize| i32::try_from(at).expect("at most 65") * cell;
-        for at in (0..SAMPLES).filter(|&at| record.weights[0][at] > 0) {
-            let first = [at % PAGE_SIDE, at / PAGE_SIDE].map(|at| (at / samples).min(side - 2));
-            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let (i, j) = (first[0] + i, first[1] + j);
-                if levels[j * side + i].is_none() {
-                    let point = fold(key.quadrant(), u0 + along(i), v0 + along(j));
-                    levels[j * side + i] = Some(level_at(geoid, point)?);
-                }
+        let corners = (0..SAMPLES).filter(|&at| record.weights[0][at] > 0).flat_map(|at| {
+            let [i, j] = [at % PAGE_SIDE, at / PAGE_SIDE].map(|at| (at / samples).min(side - 2));
+            [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)]
+        });
+        for (i, j) in corners {
+            let level = &mut levels[j * side + i];
+            if level.is_none() {
+                let point = fold(key.quadrant(), u0 + along(i), v0 + along(j));
+                *level = Some(level_at(geoid, point)?);
             }
         }
         let mut before = levels.iter().flatten().next().copied().unwrap_or(0);
@@ -515,6 +512,15 @@ fn level_at(geoid: &Geoid, point: IVec3) -> Result<i32, IngestError> {
     #[expect(clippy::cast_possible_truncation, reason = "undulations are below 120 m")]
     let level = (level_m / SEA_LEVEL_UNIT_M).round() as i32;
     Ok(level)
+}
+
+/// Adds bytes, eight at a time.
+fn digest(content: &mut Chain, bytes: &[u8]) {
+    for part in bytes.chunks(8) {
+        let mut word = [0; 8];
+        word[..part.len()].copy_from_slice(part);
+        content.add(u64::from_le_bytes(word));
+    }
 }
 
 fn coord(key: PageKey) -> TileCoord {

@@ -32,6 +32,13 @@ const AROUND: usize = 4;
 /// Second differences of this share of the step are as rough as it gets.
 const ROUGHEST: f64 = 0.02;
 
+/// Tiles that are made at once: `span` along each side from the first on.
+struct Cut {
+    quadrant: u8,
+    first: [u32; 2],
+    span: u32,
+}
+
 /// Why tiles could not be made.
 #[derive(Debug)]
 pub enum MakeError {
@@ -115,26 +122,24 @@ impl Making<'_> {
             if stop.load(Ordering::Relaxed) {
                 return Err(MakeError::Stopped);
             }
-            let first = [x * span, y * span];
-            if !self.block(*quadrant, first, span, keys, spool)? {
-                for key in keys {
-                    self.block(*quadrant, [key.x(), key.y()], 1, &[*key], spool)?;
-                }
+            let cut = Cut { quadrant: *quadrant, first: [x * span, y * span], span };
+            if !self.block(&cut, keys, spool)? {
+                keys.iter().try_for_each(|key| self.single(*key, spool))?;
             }
             done(keys.len() as u64);
             Ok(())
         })
     }
 
+    /// One tile by itself.
+    fn single(&self, key: PageKey, spool: &Spool) -> Result<(), MakeError> {
+        let cut = Cut { quadrant: key.quadrant(), first: [key.x(), key.y()], span: 1 };
+        self.block(&cut, &[key], spool).map(drop)
+    }
+
     /// The tiles of one block; `false` where it must be cut.
-    fn block(
-        &self,
-        quadrant: u8,
-        first: [u32; 2],
-        span: u32,
-        keys: &[PageKey],
-        spool: &Spool,
-    ) -> Result<bool, MakeError> {
+    fn block(&self, cut: &Cut, keys: &[PageKey], spool: &Spool) -> Result<bool, MakeError> {
+        let &Cut { quadrant, first, span } = cut;
         let margin = i64::try_from(MARGIN).expect("small");
         let square = Square {
             quadrant,
@@ -168,13 +173,12 @@ impl Making<'_> {
             let (i, j) = (mark % MARK_SIDE * MARK_STRIDE, mark / MARK_SIDE * MARK_STRIDE);
             record.roughness[0][mark] = self.roughness(block, side, [column + i, row + j]);
         }
+        let nodes = Nodes::of(&record.quanta[0], &record.weights[0], self.quantum_m);
         for (b, stats) in record.stats.iter_mut().enumerate() {
             for (a, stat) in stats.iter_mut().enumerate() {
-                *stat = Stat::NONE;
-                stat.full = 1;
-                let nodes = Nodes { quanta: &record.quanta[0], weights: &record.weights[0] };
-                nodes.look(stat, [a, b], self.quantum_m, true);
-                stat.error_m = [nodes.odd_m([a, b], self.quantum_m), 0.0];
+                *stat = nodes.stat([a, b]);
+                stat.centre_m = nodes.centre_m([a, b]);
+                stat.error_m = [nodes.odd_m([a, b]), 0.0];
             }
         }
         record
@@ -188,19 +192,13 @@ impl Making<'_> {
 
     /// Mean second difference around a mark, against the step; the quanta's own is left out.
     fn roughness(&self, block: &Block, side: usize, [column, row]: [usize; 2]) -> u8 {
+        let around = |at: usize| at - AROUND..=at + AROUND;
+        let places = around(row).flat_map(|j| around(column).map(move |i| j * side + i));
         let (mut sum, mut count) = (0.0, 0);
-        for j in row - AROUND..=row + AROUND {
-            for i in column - AROUND..=column + AROUND {
-                let at = j * side + i;
-                for next in [1, side] {
-                    let seen = [at - next, at, at + next].iter().all(|&at| block.weights[at] > 0.0);
-                    if seen {
-                        let bend = block.heights[at - next] - 2 * block.heights[at]
-                            + block.heights[at + next];
-                        sum += bend.unsigned_abs() as f64;
-                        count += 1;
-                    }
-                }
+        for (at, next) in places.flat_map(|at| [(at, 1), (at, side)]) {
+            if let Some(bend) = bend(block, at, next) {
+                sum += bend.unsigned_abs() as f64;
+                count += 1;
             }
         }
         if count == 0 {
@@ -237,41 +235,51 @@ impl Making<'_> {
         record.stats = [[Stat::NONE; BLOCKS]; BLOCKS];
         for index in 0..4 {
             let Some(child) = spool.get(self.index, key.child(index))? else { continue };
-            let half = (PAGE_SIDE - 1) / 2;
-            let (column, row) = (index % 2 * half, index / 2 * half);
-            for j in 0..=half {
-                for i in 0..=half {
-                    let (to, from) =
-                        ((row + j) * PAGE_SIDE + column + i, 2 * j * PAGE_SIDE + 2 * i);
-                    record.quanta[0][to] = child.quanta[0][from];
-                    record.weights[0][to] = child.weights[0][from];
-                    record.filled[0][to] = child.filled[0][from];
-                }
-            }
-            let half = BLOCKS / 2;
-            for j in 0..=half {
-                for i in 0..=half {
-                    let to = (index / 2 * half + j) * MARK_SIDE + index % 2 * half + i;
-                    record.roughness[0][to] = child.roughness[0][2 * j * MARK_SIDE + 2 * i];
-                }
-            }
-            for (b, a) in (0..half).flat_map(|b| (0..half).map(move |a| (b, a))) {
-                let parts = [0, 1].map(|y| [0, 1].map(|x| child.stats[2 * b + y][2 * a + x]));
-                record.stats[index / 2 * half + b][index % 2 * half + a] =
-                    joined(parts.as_flattened());
-            }
+            take(&mut record, index, &child);
         }
-        for b in 0..BLOCKS {
-            for a in 0..BLOCKS {
-                let nodes = Nodes { quanta: &record.quanta[0], weights: &record.weights[0] };
-                let mut stat = record.stats[b][a];
-                nodes.look(&mut stat, [a, b], self.quantum_m, false);
-                stat.error_m[0] = nodes.odd_m([a, b], self.quantum_m) + stat.error_m[1];
-                record.stats[b][a] = stat;
+        let nodes = Nodes::of(&record.quanta[0], &record.weights[0], self.quantum_m);
+        for (b, stats) in record.stats.iter_mut().enumerate() {
+            for (a, stat) in stats.iter_mut().enumerate() {
+                stat.centre_m = nodes.centre_m([a, b]);
+                stat.error_m[0] = nodes.odd_m([a, b]) + stat.error_m[1];
             }
         }
         Ok(record)
     }
+}
+
+/// Second difference at a point of a block, where all three points are seen.
+fn bend(block: &Block, at: usize, next: usize) -> Option<i64> {
+    let is_seen = [at - next, at, at + next].iter().all(|&at| block.weights[at] > 0.0);
+    let heights = &block.heights;
+    is_seen.then(|| heights[at - next] - 2 * heights[at] + heights[at + next])
+}
+
+/// Every second sample and mark of child `index`, and what its blocks are together.
+fn take(record: &mut Record, index: usize, child: &Record) {
+    let half = (PAGE_SIDE - 1) / 2;
+    let (column, row) = (index % 2 * half, index / 2 * half);
+    for (i, j) in cells(half + 1) {
+        let (to, from) = ((row + j) * PAGE_SIDE + column + i, 2 * j * PAGE_SIDE + 2 * i);
+        record.quanta[0][to] = child.quanta[0][from];
+        record.weights[0][to] = child.weights[0][from];
+        record.filled[0][to] = child.filled[0][from];
+    }
+    let half = BLOCKS / 2;
+    let (column, row) = (index % 2 * half, index / 2 * half);
+    for (i, j) in cells(half + 1) {
+        let (to, from) = ((row + j) * MARK_SIDE + column + i, 2 * j * MARK_SIDE + 2 * i);
+        record.roughness[0][to] = child.roughness[0][from];
+    }
+    for (a, b) in cells(half) {
+        let parts = [0, 1].map(|y| [0, 1].map(|x| child.stats[2 * b + y][2 * a + x]));
+        record.stats[row + b][column + a] = joined(parts.as_flattened());
+    }
+}
+
+/// Columns and rows of a square, row by row.
+fn cells(side: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..side).flat_map(move |j| (0..side).map(move |i| (i, j)))
 }
 
 /// What four blocks are together, seen one level coarser.
@@ -291,60 +299,46 @@ fn joined(parts: &[Stat]) -> Stat {
 struct Nodes<'a> {
     quanta: &'a [i32; SAMPLES],
     weights: &'a [u8; SAMPLES],
+    quantum_m: f64,
 }
 
-impl Nodes<'_> {
-    fn places([a, b]: [usize; 2]) -> impl Iterator<Item = (usize, usize)> {
-        let (i, j) = (a * MARK_STRIDE, b * MARK_STRIDE);
-        (j..=j + MARK_STRIDE).flat_map(move |j| (i..=i + MARK_STRIDE).map(move |i| (i, j)))
+impl<'a> Nodes<'a> {
+    fn of(quanta: &'a [i32; SAMPLES], weights: &'a [u8; SAMPLES], quantum_m: f64) -> Self {
+        Self { quanta, weights, quantum_m }
     }
 
-    fn height_m(&self, (i, j): (usize, usize), quantum_m: f64) -> Option<f64> {
+    fn places([a, b]: [usize; 2]) -> impl Iterator<Item = (usize, usize)> {
+        let (column, row) = (a * MARK_STRIDE, b * MARK_STRIDE);
+        cells(MARK_STRIDE + 1).map(move |(i, j)| (column + i, row + j))
+    }
+
+    fn height_m(&self, (i, j): (usize, usize)) -> Option<f64> {
         let at = j * PAGE_SIDE + i;
-        (self.weights[at] > 0).then(|| f64::from(self.quanta[at]) * quantum_m)
+        (self.weights[at] > 0).then(|| f64::from(self.quanta[at]) * self.quantum_m)
     }
 
     /// Distance of a sample from the middle of two others, where all three are seen.
-    fn strays_m(&self, at: (usize, usize), ends: [(usize, usize); 2], quantum_m: f64) -> f64 {
-        let height = |place| self.height_m(place, quantum_m);
-        match (height(at), height(ends[0]), height(ends[1])) {
+    fn strays_m(&self, at: (usize, usize), ends: [(usize, usize); 2]) -> f64 {
+        match (self.height_m(at), self.height_m(ends[0]), self.height_m(ends[1])) {
             (Some(at), Some(a), Some(b)) => (at - f64::midpoint(a, b)).abs(),
             _ => 0.0,
         }
     }
 
-    /// Centres, and at the last level also heights, steps and weights of a block.
-    fn look(&self, stat: &mut Stat, block: [usize; 2], quantum_m: f64, last_level: bool) {
-        let mut centre_m = 0.0_f64;
-        for (i, j) in Self::places(block) {
-            if i % 2 == 1 && j % 2 == 1 {
-                let rising = (i / 2) % 2 == (j / 2) % 2;
-                let ends = if rising {
-                    [(i - 1, j - 1), (i + 1, j + 1)]
-                } else {
-                    [(i - 1, j + 1), (i + 1, j - 1)]
-                };
-                centre_m = centre_m.max(self.strays_m((i, j), ends, quantum_m));
-            }
-            if !last_level {
-                continue;
-            }
-            stat.full &= u32::from(self.weights[j * PAGE_SIDE + i] == FULL);
-            let Some(height_m) = self.height_m((i, j), quantum_m) else { continue };
-            let range = &mut stat.range_m;
-            *range = [range[0].min(narrow(height_m)), range[1].max(narrow(height_m))];
-            for next in [(i + 1, j), (i, j + 1)] {
-                let inside = next.0 < PAGE_SIDE && next.1 < PAGE_SIDE;
-                let next_m = if inside { self.height_m(next, quantum_m) } else { None };
-                let step_m = next_m.map_or(0.0, |next_m| (next_m - height_m).abs());
-                stat.slope_m = stat.slope_m.max(narrow(step_m));
-            }
+    /// How far the centres of cells stray from the diagonals through them.
+    fn centre_m(&self, block: [usize; 2]) -> f32 {
+        let mut most_m = 0.0_f64;
+        for (i, j) in Self::places(block).filter(|(i, j)| i % 2 == 1 && j % 2 == 1) {
+            let (rising, falling) =
+                ([(i - 1, j - 1), (i + 1, j + 1)], [(i - 1, j + 1), (i + 1, j - 1)]);
+            let ends = if (i / 2) % 2 == (j / 2) % 2 { rising } else { falling };
+            most_m = most_m.max(self.strays_m((i, j), ends));
         }
-        stat.centre_m = narrow(centre_m);
+        narrow(most_m)
     }
 
     /// How far the middles of the next coarser grid's sides stray from them.
-    fn odd_m(&self, block: [usize; 2], quantum_m: f64) -> f32 {
+    fn odd_m(&self, block: [usize; 2]) -> f32 {
         let mut most_m = 0.0_f64;
         for (i, j) in Self::places(block) {
             let ends = match (i % 2, j % 2) {
@@ -352,8 +346,26 @@ impl Nodes<'_> {
                 (0, 1) => [(i, j - 1), (i, j + 1)],
                 _ => continue,
             };
-            most_m = most_m.max(self.strays_m((i, j), ends, quantum_m));
+            most_m = most_m.max(self.strays_m((i, j), ends));
         }
         narrow(most_m)
+    }
+
+    /// Heights, steps and weights of a block of the last level.
+    fn stat(&self, block: [usize; 2]) -> Stat {
+        let mut stat = Stat { full: 1, ..Stat::NONE };
+        for (i, j) in Self::places(block) {
+            stat.full &= u32::from(self.weights[j * PAGE_SIDE + i] == FULL);
+            let Some(height_m) = self.height_m((i, j)) else { continue };
+            let range = &mut stat.range_m;
+            *range = [range[0].min(narrow(height_m)), range[1].max(narrow(height_m))];
+            for next in [(i + 1, j), (i, j + 1)] {
+                let inside = next.0 < PAGE_SIDE && next.1 < PAGE_SIDE;
+                let next_m = inside.then(|| self.height_m(next)).flatten();
+                let step_m = next_m.map_or(0.0, |next_m| (next_m - height_m).abs());
+                stat.slope_m = stat.slope_m.max(narrow(step_m));
+            }
+        }
+        stat
     }
 }

@@ -142,18 +142,9 @@ impl Survey {
         for round in 1..=last {
             let mut found = Vec::new();
             todo.retain(|&at| {
-                let (x, y) = (at % width, at / width);
-                let near = (y.saturating_sub(1)..(y + 2).min(height)).flat_map(|y| {
-                    (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x)
-                });
-                let (mut sum, mut count) = (0.0, 0);
-                for height_m in near.map(|at| heights_m[at]).filter(|height| !height.is_nan()) {
-                    (sum, count) = (sum + f64::from(height_m), count + 1);
-                }
-                if count > 0 {
-                    found.push((at, mean(sum, count)));
-                }
-                count == 0
+                let mean_m = mean_near(heights_m, at, [width, height]);
+                found.extend(mean_m.map(|mean_m| (at, mean_m)));
+                mean_m.is_none()
             });
             for (at, height_m) in found {
                 (heights_m[at], rounds[at]) = (height_m, round);
@@ -170,6 +161,19 @@ impl Survey {
             *height_m = if is_far { coarse_m } else { *height_m + (coarse_m - *height_m) * share };
         }
     }
+}
+
+/// Mean of the known heights next to a posting, diagonally too; `None` where there are none.
+fn mean_near(heights_m: &[f32], at: usize, [width, height]: [usize; 2]) -> Option<f32> {
+    let (x, y) = (at % width, at / width);
+    let rows = y.saturating_sub(1)..(y + 2).min(height);
+    let columns = x.saturating_sub(1)..(x + 2).min(width);
+    let near = rows.flat_map(|y| columns.clone().map(move |x| y * width + x));
+    let (mut sum, mut count) = (0.0, 0);
+    for height_m in near.map(|at| heights_m[at]).filter(|height| !height.is_nan()) {
+        (sum, count) = (sum + f64::from(height_m), count + 1);
+    }
+    (count > 0).then(|| mean(sum, count))
 }
 
 impl Band {
@@ -193,17 +197,21 @@ impl Band {
             let row = i64::try_from(first_row + from).expect("rows fit");
             raster.window(0, row, columns, count, &mut heights_m)?;
             for (at, &height_m) in heights_m.iter().enumerate() {
-                if height_m.is_nan() {
-                    band.voids += 1;
-                    continue;
-                }
-                band.range_m = [band.range_m[0].min(height_m), band.range_m[1].max(height_m)];
-                band.whole_metres &= height_m == height_m.round();
-                let lowest_m = &mut band.lowest_m[at % columns / block];
-                *lowest_m = lowest_m.min(height_m);
+                band.add(at % columns / block, height_m);
             }
         }
         Ok(band)
+    }
+
+    fn add(&mut self, block: usize, height_m: f32) {
+        if height_m.is_nan() {
+            self.voids += 1;
+            return;
+        }
+        self.range_m = [self.range_m[0].min(height_m), self.range_m[1].max(height_m)];
+        self.whole_metres &= height_m == height_m.round();
+        let lowest_m = &mut self.lowest_m[block];
+        *lowest_m = lowest_m.min(height_m);
     }
 }
 

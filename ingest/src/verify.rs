@@ -68,6 +68,13 @@ struct Reader<'a> {
     planes: Mutex<Planes>,
 }
 
+/// An archive, and what it was built from.
+struct Comparison<'a> {
+    reader: Reader<'a>,
+    sources: &'a [Source],
+    plans: &'a [Plan],
+}
+
 /// Compares an archive with what it was built from.
 ///
 /// # Errors
@@ -88,38 +95,38 @@ pub fn verify(
         tiles: Mutex::new(LruCache::new(size)),
         planes: Mutex::new(LruCache::new(size)),
     };
-    let parts = |source: &Source| {
-        let grid = &source.raster.grid;
-        u64::from(grid.rows.div_ceil(PART)) * u64::from(grid.columns.div_ceil(PART))
-    };
-    let total = sources.iter().map(parts).sum();
+    let comparison = Comparison { reader, sources: &sources, plans: &plans };
+    let total = sources.iter().map(|source| parts(source).len() as u64).sum();
     let done = AtomicU64::new(0);
+    let compare = |plan: usize, source: usize, first: [u32; 2]| {
+        if stop.load(Ordering::Relaxed) {
+            return Err(IngestError::Stopped);
+        }
+        let sums = comparison.part(plan, source, first)?;
+        progress(Progress::Comparing(done.fetch_add(1, Ordering::Relaxed) + 1, total));
+        Ok(sums)
+    };
     let mut differences = Vec::new();
     for (index, plan) in plans.iter().enumerate() {
         for &source in &plan.sources {
-            let grid = &sources[source].raster.grid;
-            let starts = |end: u32| (0..end.div_ceil(PART)).map(|part| part * PART);
-            let all: Vec<_> =
-                starts(grid.rows).flat_map(|y| starts(grid.columns).map(move |x| [x, y])).collect();
-            let sums: Result<Vec<_>, IngestError> = all
-                .par_iter()
-                .map(|&first| {
-                    if stop.load(Ordering::Relaxed) {
-                        return Err(IngestError::Stopped);
-                    }
-                    let sums = compare(&reader, &sources, &plans, index, source, first)?;
-                    progress(Progress::Comparing(done.fetch_add(1, Ordering::Relaxed) + 1, total));
-                    Ok(sums)
-                })
-                .collect();
+            let parts = parts(&sources[source]);
+            let sums = parts.par_iter().map(|&first| compare(index, source, first));
+            let sums: Result<Vec<_>, IngestError> = sums.collect();
             differences.push(difference(&sources[source], plan, sums?));
         }
     }
     Ok(differences)
 }
 
+/// First column and row of all parts of a source, row by row.
+fn parts(source: &Source) -> Vec<[u32; 2]> {
+    let grid = &source.raster.grid;
+    let starts = |end: u32| (0..end.div_ceil(PART)).map(|part| part * PART);
+    starts(grid.rows).flat_map(|y| starts(grid.columns).map(move |x| [x, y])).collect()
+}
+
 fn difference(source: &Source, plan: &Plan, parts: Vec<Sums>) -> Difference {
-    let mut whole = Sums { squares: 0.0, max_m: 0.0, compared: 0, hidden: 0, bins: vec![0; BINS] };
+    let mut whole = Sums::none();
     for part in parts {
         whole.squares += part.squares;
         whole.max_m = whole.max_m.max(part.max_m);
@@ -144,53 +151,52 @@ fn difference(source: &Source, plan: &Plan, parts: Vec<Sums>) -> Difference {
     }
 }
 
-fn compare(
-    reader: &Reader<'_>,
-    sources: &[Source],
-    plans: &[Plan],
-    plan: usize,
-    source: usize,
-    first: [u32; 2],
-) -> Result<Sums, IngestError> {
-    let grid = &sources[source].raster.grid;
-    let size = [grid.columns, grid.rows].into_iter().zip(first).map(|(end, at)| PART.min(end - at));
-    let [width, height] = size.collect::<Vec<_>>()[..] else { unreachable!("two axes") };
-    let mut heights_m = Vec::new();
-    let [width, height] = [width as usize, height as usize];
-    sources[source].raster.window(
-        first[0].into(),
-        first[1].into(),
-        width,
-        height,
-        &mut heights_m,
-    )?;
-    let layers: Vec<_> = plans[plan..].iter().map(|plan| layer(plan, sources)).collect();
-    let own = plans[plan].sources.iter().position(|&index| index == source);
-    let own = own.expect("a plan's own source");
-    let mut sums = Sums { squares: 0.0, max_m: 0.0, compared: 0, hidden: 0, bins: vec![0; BINS] };
-    for (at, height_m) in heights_m.iter().enumerate().filter(|(_, height)| !height.is_nan()) {
-        let column = f64::from(first[0]) + (at % width) as f64;
-        let row = f64::from(first[1]) + (at / width) as f64;
-        let at = grid.lon_lat(column, row);
-        let covered = layers[1..].iter().any(|finer| finer.is_seen(at));
-        if covered || !layers[0].shows(own, at) {
-            sums.hidden += 1;
-            continue;
+impl Comparison<'_> {
+    /// Compares one part of a source with the layer of one plan.
+    fn part(&self, plan: usize, source: usize, first: [u32; 2]) -> Result<Sums, IngestError> {
+        let raster = &self.sources[source].raster;
+        let grid = &raster.grid;
+        let width = PART.min(grid.columns - first[0]) as usize;
+        let height = PART.min(grid.rows - first[1]) as usize;
+        let mut heights_m = Vec::new();
+        raster.window(first[0].into(), first[1].into(), width, height, &mut heights_m)?;
+        let layers: Vec<_> =
+            self.plans[plan..].iter().map(|plan| layer(plan, self.sources)).collect();
+        let own = self.plans[plan].sources.iter().position(|&index| index == source);
+        let own = own.expect("a plan's own source");
+        let mut sums = Sums::none();
+        for (at, height_m) in heights_m.iter().enumerate().filter(|(_, height)| !height.is_nan()) {
+            let column = f64::from(first[0]) + (at % width) as f64;
+            let row = f64::from(first[1]) + (at / width) as f64;
+            let at = grid.lon_lat(column, row);
+            let covered = layers[1..].iter().any(|finer| finer.is_seen(at));
+            if covered || !layers[0].shows(own, at) {
+                sums.hidden += 1;
+                continue;
+            }
+            match self.reader.surface_m(&self.plans[plan], plan, at)? {
+                Some(surface_m) => sums.add((surface_m - f64::from(*height_m)).abs()),
+                None => sums.hidden += 1,
+            }
         }
-        let Some(surface_m) = reader.surface_m(&plans[plan], plan, at)? else {
-            sums.hidden += 1;
-            continue;
-        };
-        let off_m = (surface_m - f64::from(*height_m)).abs();
-        sums.compared += 1;
-        sums.squares += off_m * off_m;
-        sums.max_m = sums.max_m.max(off_m);
+        Ok(sums)
+    }
+}
+
+impl Sums {
+    fn none() -> Self {
+        Self { squares: 0.0, max_m: 0.0, compared: 0, hidden: 0, bins: vec![0; BINS] }
+    }
+
+    fn add(&mut self, off_m: f64) {
+        self.compared += 1;
+        self.squares += off_m * off_m;
+        self.max_m = self.max_m.max(off_m);
         #[expect(clippy::cast_possible_truncation, reason = "capped to the last bin")]
         #[expect(clippy::cast_sign_loss, reason = "never negative")]
         let bin = ((off_m / BIN_M) as usize).min(BINS - 1);
-        sums.bins[bin] += 1;
+        self.bins[bin] += 1;
     }
-    Ok(sums)
 }
 
 impl Reader<'_> {

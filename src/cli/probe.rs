@@ -19,13 +19,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread::ScopedJoinHandle;
 
 /// Places that are looked at together: sorted by where they lie, answered by all cores.
 const BATCH: usize = 65_536;
 /// From so many places on there is a progress bar.
 const MANY: usize = 10_000;
-/// Pages that each thread keeps.
-const PAGES: usize = 256;
+/// Pages that all threads together keep: 256 MiB.
+const PAGES: usize = 4096;
 
 const EXAMPLES: &str = "\
 Each line has: latitude, longitude, height above the ellipsoid, height above sea level (EGM96 where
@@ -121,7 +122,7 @@ struct Probe {
 impl Probe {
     fn new(sources: &Arc<Sources>, query: Query, answers: Answers) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let surveyor = |_| Surveyor::new(sources.clone(), PAGES);
+        let surveyor = |_| Surveyor::new(sources.clone(), PAGES / threads);
         let surveyors = (0..threads).map(surveyor).collect();
         Self { query, answers, surveyors, named: BTreeMap::new() }
     }
@@ -158,31 +159,31 @@ impl Probe {
         order.sort_unstable();
         let share = order.len().div_ceil(self.surveyors.len()).max(1);
         let query = self.query;
+        let answer = |share: &[(u64, usize)], surveyor: &mut Surveyor| -> Vec<Found> {
+            share.iter().map(|&(_, at)| ask(surveyor, &spots[at], query)).collect()
+        };
+        let answer = &answer;
         let found: Vec<Vec<Found>> = std::thread::scope(|scope| {
             let shares = order.chunks(share).zip(&mut self.surveyors);
             let threads: Vec<_> = shares
-                .map(|(share, surveyor)| {
-                    scope.spawn(move || {
-                        share.iter().map(|&(_, at)| ask(surveyor, &spots[at], query)).collect()
-                    })
-                })
+                .map(|(part, surveyor)| scope.spawn(move || answer(part, surveyor)))
                 .collect();
-            let join = |thread: std::thread::ScopedJoinHandle<'_, _>| {
-                thread.join().expect("answering does not panic")
-            };
+            let join =
+                |thread: ScopedJoinHandle<'_, _>| thread.join().expect("answering does not panic");
             threads.into_iter().map(join).collect()
         });
         let mut answers = vec![Answer::NotReady; spots.len()];
         for (found, &(_, at)) in found.into_iter().flatten().zip(&order) {
             answers[at] = found.answer;
-            if let Some(error) = found.error {
-                let archive = error.archive().unwrap_or("the planet").to_owned();
-                self.named.entry(archive).or_insert_with(|| {
-                    format!("{error}; answers there are marked: coarser, or not ready")
-                });
-            }
+            found.error.into_iter().for_each(|error| self.name(&error));
         }
         spots.iter().zip(answers).try_for_each(|(spot, answer)| self.answers.add(spot, answer))
+    }
+
+    fn name(&mut self, error: &SourceError) {
+        let archive = error.archive().unwrap_or("the planet").to_owned();
+        let what = || format!("{error}; answers there are marked: coarser, or not ready");
+        self.named.entry(archive).or_insert_with(what);
     }
 }
 

@@ -107,7 +107,7 @@ fn archive(damaged: impl Fn(PageKey) -> bool, content: u64) -> Vec<u8> {
     let writer = PmTilesWriter::new(TileType::Unknown)
         .internal_compression(Compression::Gzip)
         .tile_compression(Compression::None)
-        .metadata(&metadata::to_json(&facts, Value::Null));
+        .metadata(metadata::to_json(&facts, Value::Null));
     let mut writer = writer.create(&mut file).unwrap();
     for key in keys() {
         let (z, x, y) = key.zxy();

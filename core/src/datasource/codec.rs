@@ -303,60 +303,60 @@ impl Contexts {
         known: Option<Known<'_>>,
         layer: &mut LayerTile,
     ) {
-        let LayerTile { quanta, weights, .. } = layer;
-        let is_seen = |at: usize| weights.as_ref().is_none_or(|weights| weights[at] > 0);
+        let mut heights = Heights::of(layer);
         let levels = if let Some(known) = known {
-            for at in 0..SAMPLES {
-                if let Some(place) = known.place(at) {
-                    quanta[at] = if is_seen(at) { known.layer.quanta[place] } else { 0 };
-                }
-            }
+            heights.take(known);
             1
         } else {
-            self.corners(stream, quanta, &is_seen);
+            self.corners(stream, &mut heights);
             PAGE_BITS
         };
-        let mut sizes = [0_u8; SAMPLES];
-        let mut before = 0;
         for (level, sides) in (0..levels).rev().flat_map(|level| [(level, false), (level, true)]) {
-            let step = 1 << level;
-            let class = usize::from(level).min(FINE - 1);
-            for (i, j) in new_places(step, sides) {
-                let at = j * PAGE_SIDE + i;
-                if !is_seen(at) {
-                    quanta[at] = 0;
-                    continue;
-                }
-                let guess = guess(quanta, &is_seen, (i, j), (step, sides));
-                let Guess { expected, spread } =
-                    guess.unwrap_or(Guess { expected: before, spread: 4 });
-                let rough = roughness(&sizes, (i, j), step, spread);
-                let left = quanta[at].wrapping_sub(expected);
-                let left = stream.number(&mut self.height[class][rough], left);
-                quanta[at] = expected.wrapping_add(left);
-                before = quanta[at];
-                sizes[at] = u8::try_from(left.unsigned_abs().min(254)).expect("capped") + 1;
+            for place in new_places(1 << level, sides) {
+                self.sample(stream, &mut heights, place, (level, sides));
             }
         }
     }
 
-    fn corners(
-        &mut self,
-        stream: &mut Stream<'_>,
-        quanta: &mut [i32; SAMPLES],
-        is_seen: &impl Fn(usize) -> bool,
-    ) {
+    fn corners(&mut self, stream: &mut Stream<'_>, heights: &mut Heights<'_>) {
         let last = PAGE_SIDE - 1;
         let mut expected = 0;
         for at in [0, last, last * PAGE_SIDE, last * PAGE_SIDE + last] {
-            if !is_seen(at) {
-                quanta[at] = 0;
+            if !heights.is_seen(at) {
+                heights.quanta[at] = 0;
                 continue;
             }
-            let left = stream.number(&mut self.corner, quanta[at].wrapping_sub(expected));
-            quanta[at] = expected.wrapping_add(left);
-            expected = quanta[at];
+            let left = heights.quanta[at].wrapping_sub(expected);
+            let left = stream.number(&mut self.corner, left);
+            heights.quanta[at] = expected.wrapping_add(left);
+            expected = heights.quanta[at];
         }
+    }
+
+    /// A sample that a level adds, in the context of how rough it was around it.
+    fn sample(
+        &mut self,
+        stream: &mut Stream<'_>,
+        heights: &mut Heights<'_>,
+        (i, j): (usize, usize),
+        (level, sides): (u8, bool),
+    ) {
+        let at = j * PAGE_SIDE + i;
+        if !heights.is_seen(at) {
+            heights.quanta[at] = 0;
+            return;
+        }
+        let step = 1 << level;
+        let class = usize::from(level).min(FINE - 1);
+        let guess = heights.guess((i, j), (step, sides));
+        let Guess { expected, spread } =
+            guess.unwrap_or(Guess { expected: heights.before, spread: 4 });
+        let rough = roughness(&heights.sizes, (i, j), step, spread);
+        let left = heights.quanta[at].wrapping_sub(expected);
+        let left = stream.number(&mut self.height[class][rough], left);
+        heights.quanta[at] = expected.wrapping_add(left);
+        heights.before = heights.quanta[at];
+        heights.sizes[at] = u8::try_from(left.unsigned_abs().min(254)).expect("capped") + 1;
     }
 
     fn sea_level(
@@ -446,45 +446,68 @@ struct Guess {
     spread: u32,
 }
 
-/// From the known samples one and three steps away, along the axes or the diagonals; `None` where
-/// none of them is seen.
-fn guess(
-    quanta: &[i32; SAMPLES],
-    is_seen: &impl Fn(usize) -> bool,
-    (i, j): (usize, usize),
-    (step, sides): (usize, bool),
-) -> Option<Guess> {
-    let ways: [(isize, isize); 2] = if sides { [(1, 0), (0, 1)] } else { [(1, 1), (1, -1)] };
-    let step = step.cast_signed();
-    let at = |(di, dj): (isize, isize), steps: isize| -> Option<i64> {
-        let i = i.checked_add_signed(di * steps * step).filter(|&i| i < PAGE_SIDE)?;
-        let j = j.checked_add_signed(dj * steps * step).filter(|&j| j < PAGE_SIDE)?;
-        let at = j * PAGE_SIDE + i;
-        is_seen(at).then(|| i64::from(quanta[at]))
-    };
-    let [one, other] = ways.map(|way| {
-        let (before, after) = (at(way, -1)?, at(way, 1)?);
-        let middle = match (at(way, -3), at(way, 3)) {
-            (Some(first), Some(last)) => (9 * (before + after) - first - last + 8) >> 4,
-            _ => (before + after) >> 1,
+/// The heights of a layer, as far as they are known, and what was left over on the way.
+struct Heights<'a> {
+    quanta: &'a mut [i32; SAMPLES],
+    weights: Option<&'a [u8; SAMPLES]>,
+    /// One more than what was left over, capped; 0 where nothing was coded.
+    sizes: [u8; SAMPLES],
+    /// The height coded last.
+    before: i32,
+}
+
+impl<'a> Heights<'a> {
+    fn of(layer: &'a mut LayerTile) -> Self {
+        let LayerTile { quanta, weights, .. } = layer;
+        Self { quanta, weights: weights.as_deref(), sizes: [0; SAMPLES], before: 0 }
+    }
+
+    fn is_seen(&self, at: usize) -> bool {
+        self.weights.is_none_or(|weights| weights[at] > 0)
+    }
+
+    /// Takes every second sample from the parent.
+    fn take(&mut self, known: Known<'_>) {
+        for (at, place) in (0..SAMPLES).filter_map(|at| Some((at, known.place(at)?))) {
+            self.quanta[at] = if self.is_seen(at) { known.layer.quanta[place] } else { 0 };
+        }
+    }
+
+    /// From the known samples one and three steps away, along the axes or the diagonals; `None` where
+    /// none of them is seen.
+    fn guess(&self, (i, j): (usize, usize), (step, sides): (usize, bool)) -> Option<Guess> {
+        let ways: [(isize, isize); 2] = if sides { [(1, 0), (0, 1)] } else { [(1, 1), (1, -1)] };
+        let step = step.cast_signed();
+        let at = |(di, dj): (isize, isize), steps: isize| -> Option<i64> {
+            let i = i.checked_add_signed(di * steps * step).filter(|&i| i < PAGE_SIDE)?;
+            let j = j.checked_add_signed(dj * steps * step).filter(|&j| j < PAGE_SIDE)?;
+            let at = j * PAGE_SIDE + i;
+            self.is_seen(at).then(|| i64::from(self.quanta[at]))
         };
-        Some((middle, before.abs_diff(after)))
-    });
-    let cut = |value: i64| {
-        let most = i64::from(i32::MAX / 2);
-        i32::try_from(value.clamp(-most, most)).expect("clamped")
-    };
-    let (expected, spread) = match (one, other) {
-        (Some((a, rise)), Some((b, run))) => {
-            (cut((a + b) >> 1), a.abs_diff(b) + rise / 4 + run / 4)
-        }
-        (Some((a, _)), None) | (None, Some((a, _))) => (cut(a), 4),
-        (None, None) => {
-            let near = ways.into_iter().flat_map(|way| [at(way, -1), at(way, 1)]);
-            (cut(near.flatten().next()?), 4)
-        }
-    };
-    Some(Guess { expected, spread: u32::try_from(spread.min(1 << 20)).expect("capped") })
+        let [one, other] = ways.map(|way| {
+            let (before, after) = (at(way, -1)?, at(way, 1)?);
+            let middle = match (at(way, -3), at(way, 3)) {
+                (Some(first), Some(last)) => (9 * (before + after) - first - last + 8) >> 4,
+                _ => (before + after) >> 1,
+            };
+            Some((middle, before.abs_diff(after)))
+        });
+        let cut = |value: i64| {
+            let most = i64::from(i32::MAX / 2);
+            i32::try_from(value.clamp(-most, most)).expect("clamped")
+        };
+        let (expected, spread) = match (one, other) {
+            (Some((a, rise)), Some((b, run))) => {
+                (cut((a + b) >> 1), a.abs_diff(b) + rise / 4 + run / 4)
+            }
+            (Some((a, _)), None) | (None, Some((a, _))) => (cut(a), 4),
+            (None, None) => {
+                let near = ways.into_iter().flat_map(|way| [at(way, -1), at(way, 1)]);
+                (cut(near.flatten().next()?), 4)
+            }
+        };
+        Some(Guess { expected, spread: u32::try_from(spread.min(1 << 20)).expect("capped") })
+    }
 }
 
 /// The class of a sample by the sizes of what was left over around it.
@@ -501,149 +524,10 @@ fn roughness(sizes: &[u8; SAMPLES], (i, j): (usize, usize), step: usize, spread:
         sum += size.saturating_sub(1);
         count += u32::from(size > 0);
     }
-    let nearby = if count > 0 { sum * 8 / count } else { 2 * spread };
+    let nearby = (sum * 8).checked_div(count).unwrap_or(2 * spread);
     let active = nearby + spread;
     (32 - (active + 1).leading_zeros() as usize - 1).min(ROUGH - 1)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::facts::{Datum, FORMAT_VERSION, LayerFacts};
-    use super::*;
-    use crate::digest::mix;
-    use crate::geodesy::Ellipsoid;
-
-    fn facts() -> ArchiveFacts {
-        let layer = |depth| LayerFacts {
-            depth,
-            quantum_m: 1.0,
-            spacing_m: 90.0,
-            blend_m: 700.0,
-            sources: Vec::new(),
-        };
-        ArchiveFacts {
-            version: FORMAT_VERSION,
-            body_name: "Earth".into(),
-            body: Ellipsoid::WGS84,
-            datum: Datum::Egm96,
-            height_range_m: [-500.0, 9000.0],
-            content: 0,
-            layers: vec![layer(4), layer(12)],
-        }
-    }
-
-    /// A tile of hills whose numbers look random below `noise`.
-    fn tile(key: PageKey, noise: u64) -> Tile {
-        let height = |at: usize| {
-            let (i, j) = ((at % PAGE_SIDE) as i64, (at / PAGE_SIDE) as i64);
-            (i * i / 3 - j * j / 5 + (mix(at as u64) % noise) as i64) as i32
-        };
-        let layer = |layer: u8, seed: u64| {
-            let side = sea_level_side(key.depth(), sea_level_grid([4, 12][usize::from(layer)]));
-            let mark = |at: usize| Mark {
-                error_odd: (at % 7) as u8,
-                variation: 90 + (mix(at as u64 + seed) % 9) as u8,
-                edge: at % 5 == 0,
-                range: if at % 5 == 0 { [at as i16 - 40, 3] } else { [0; 2] },
-                ..Mark::default()
-            };
-            LayerTile {
-                layer,
-                quanta: Box::new(core::array::from_fn(height)),
-                weights: (seed % 2 == 1).then(|| {
-                    Box::new(core::array::from_fn(|at| ((at / PAGE_SIDE) * 4).min(255) as u8))
-                }),
-                filled: (seed > 1).then(|| Box::new(core::array::from_fn(|at| at % 65 > 40))),
-                sea_level: (0..side * side).map(|at| 1500 + (at % 65) as i32).collect(),
-                marks: Box::new(core::array::from_fn(mark)),
-            }
-        };
-        let layers =
-            if key.depth() <= 4 { vec![layer(0, 0), layer(1, 3)] } else { vec![layer(1, 1)] };
-        Tile { key, layers }
-    }
-
-    #[test]
-    fn tiles_come_back_but_for_samples_without_weight() {
-        for (key, noise) in [(PageKey::new(0, 4, 3, 9), 5), (PageKey::new(3, 12, 77, 4000), 3000)] {
-            let tile = tile(key, noise);
-            let bytes = encode(&tile, None, &facts());
-            let mut back = decode(&bytes, key, None, &facts()).unwrap();
-            for (layer, original) in back.layers.iter_mut().zip(&tile.layers) {
-                for at in (0..SAMPLES).filter(|&at| original.weight(at) == 0) {
-                    assert_eq!(layer.quanta[at], 0);
-                    layer.quanta[at] = original.quanta[at];
-                }
-            }
-            assert_eq!(back, tile);
-            // Decoded once more, what has no weight is the same too.
-            let again = decode(&encode(&back, None, &facts()), key, None, &facts()).unwrap();
-            assert_eq!(decode(&bytes, key, None, &facts()).unwrap(), again);
-        }
-    }
-
-    #[test]
-    fn a_tile_takes_every_second_sample_from_its_parent() {
-        let (parent, child) = (tile(PageKey::new(0, 6, 10, 11), 50), PageKey::new(0, 7, 21, 22));
-        let mut fine = tile(child, 50);
-        let (above, below) = (&parent.layers[0], &mut fine.layers[0]);
-        let known = Known::of(Some(&parent), child, 1).unwrap();
-        let places: Vec<_> = (0..SAMPLES).filter_map(|at| Some((at, known.place(at)?))).collect();
-        for (at, place) in places {
-            below.quanta[at] = above.quanta[place];
-            below.weights.as_mut().unwrap()[at] = above.weight(place);
-        }
-        for at in 0..SAMPLES {
-            if below.weight(at) == 0 {
-                below.quanta[at] = 0;
-            }
-        }
-        let bytes = encode(&parent, None, &facts());
-        let parent = decode(&bytes, parent.key, None, &facts()).unwrap();
-        let bytes = encode(&fine, Some(&parent), &facts());
-        assert_eq!(decode(&bytes, child, Some(&parent), &facts()), Ok(fine.clone()));
-        assert!(bytes.len() < encode(&fine, None, &facts()).len() * 9 / 10);
-    }
-
-    #[test]
-    fn smooth_ground_takes_less_than_a_bit_a_sample() {
-        let key = PageKey::new(1, 12, 5, 6);
-        let mut tile = tile(key, 1);
-        tile.layers[0].weights = None;
-        let bytes = encode(&tile, None, &facts()).len();
-        assert!(bytes < SAMPLES / 8, "{bytes}");
-    }
-
-    #[test]
-    fn damaged_bytes_are_told_apart_from_foreign_ones() {
-        let key = PageKey::new(3, 12, 77, 4000);
-        let bytes = encode(&tile(key, 9), None, &facts());
-        assert_eq!(decode(&[], key, None, &facts()), Err(TileFault::Short { found: 0 }));
-        assert_eq!(decode(&bytes[..40], key, None, &facts()), Err(TileFault::Damaged));
-        assert_eq!(decode(&bytes, PageKey::root(0), None, &facts()), Err(TileFault::Damaged));
-        let mut other = bytes.clone();
-        other[0] = 7;
-        assert_eq!(decode(&other, key, None, &facts()), Err(TileFault::Version { found: 7 }));
-        for at in 1..bytes.len() {
-            let mut flipped = bytes.clone();
-            flipped[at] ^= 1 << (at % 8);
-            assert_eq!(decode(&flipped, key, None, &facts()), Err(TileFault::Damaged), "byte {at}");
-        }
-    }
-
-    #[test]
-    fn whatever_the_bytes_decoding_ends() {
-        let key = PageKey::new(3, 4, 7, 4);
-        for seed in 0..300_u64 {
-            let length = 3 + (mix(seed) % 3000) as usize;
-            let mut bytes: Vec<u8> =
-                (0..length).map(|at| mix(seed << 20 | at as u64) as u8).collect();
-            bytes[0] = VERSION;
-            let sum = check_sum(key, &bytes);
-            bytes.extend(sum.to_le_bytes());
-            if let Ok(tile) = decode(&bytes, key, None, &facts()) {
-                assert!(tile.layers.iter().all(|layer| layer.sea_level.len() <= SAMPLES));
-            }
-        }
-    }
-}
+mod tests;

@@ -72,6 +72,16 @@ pub struct Scope {
     pub edges_m: [f64; 2],
 }
 
+/// What is in doubt: the ground around a lattice point of one page.
+struct Question<'a> {
+    bed: &'a Bed,
+    key: PageKey,
+    point: IVec3,
+    scope: &'a Scope,
+    /// Marks are read from tiles so many levels up.
+    coarser: u8,
+}
+
 /// One layer of one archive, and its tiles around one page.
 struct Plot<'a> {
     facts: &'a LayerFacts,
@@ -192,24 +202,10 @@ impl<'a> Plots<'a> {
     pub fn new(bed: &'a Bed, needs: &[Need], tiles: &'a [Option<Arc<Tile>>]) -> Self {
         let mut plots = Vec::new();
         for (index, archive) in bed.archives.iter().enumerate().rev() {
-            for (layer, facts) in archive.layers.iter().enumerate() {
-                let own = needs.iter().zip(tiles).filter(|(need, _)| need.archive == index);
-                let own = own.filter(|(need, _)| need.key.depth() <= facts.depth);
-                let of_layer = |tile: &'a Arc<Tile>| {
-                    tile.layers.iter().find(|plane| usize::from(plane.layer) == layer)
-                };
-                let mut tiles: Vec<_> =
-                    own.map(|(need, tile)| (need.key, tile.as_ref().and_then(of_layer))).collect();
-                // The finest tile that holds a point is asked first.
-                tiles.sort_by_key(|(key, _)| core::cmp::Reverse(key.depth()));
-                plots.push(Plot {
-                    facts,
-                    archive,
-                    grid: sea_level_grid(facts.depth),
-                    step_m: bed.step_m(facts),
-                    tiles,
-                });
-            }
+            let own = needs.iter().zip(tiles).filter(|(need, _)| need.archive == index);
+            let own: Vec<_> = own.map(|(need, tile)| (need.key, tile.as_deref())).collect();
+            let layers = 0..archive.layers.len();
+            plots.extend(layers.map(|layer| Plot::new(bed, archive, layer, &own)));
         }
         let readings = vec![Reading::default(); plots.len()];
         Self { bed, plots, readings }
@@ -250,8 +246,7 @@ impl<'a> Plots<'a> {
                 roughness = roughness * beneath + rough * reading.weight;
             }
             if reading.weight >= 0.5 {
-                let filled = reading.filled;
-                ground.origin = if filled { Origin::Filled } else { Origin::Measured };
+                ground.origin = origin_of(&reading);
             }
         }
         if ground.origin != Origin::Procedural {
@@ -272,9 +267,10 @@ impl<'a> Plots<'a> {
 
     /// Bounds around a lattice point of the page `key`, at which the ground is `ground`.
     pub fn doubt(&self, key: PageKey, point: IVec3, scope: &Scope, coarser: u8) -> Doubt {
+        let question = Question { bed: self.bed, key, point, scope, coarser };
         let mut doubt = self.doubt_of_planet(point, scope);
         for plot in &self.plots {
-            plot.add_doubt(self.bed, (key, point), scope, coarser, &mut doubt);
+            plot.add_doubt(&question, &mut doubt);
         }
         doubt
     }
@@ -299,6 +295,25 @@ impl<'a> Plots<'a> {
 }
 
 impl<'a> Plot<'a> {
+    /// Layer `layer` of an archive, of whose tiles these are around the page.
+    fn new(
+        bed: &Bed,
+        archive: &'a ArchiveFacts,
+        layer: usize,
+        tiles: &[(PageKey, Option<&'a Tile>)],
+    ) -> Self {
+        let facts = &archive.layers[layer];
+        let is_own = |plane: &&LayerTile| usize::from(plane.layer) == layer;
+        let of_layer = |tile: &'a Tile| tile.layers.iter().find(is_own);
+        let reached = tiles.iter().filter(|(key, _)| key.depth() <= facts.depth);
+        let mut tiles: Vec<_> =
+            reached.map(|&(key, tile)| (key, tile.and_then(of_layer))).collect();
+        // The finest tile that holds a point is asked first.
+        tiles.sort_by_key(|(key, _)| core::cmp::Reverse(key.depth()));
+        let (grid, step_m) = (sea_level_grid(facts.depth), bed.step_m(facts));
+        Self { facts, archive, grid, step_m, tiles }
+    }
+
     fn tile_at(&self, point: IVec3) -> Option<(PageKey, &'a LayerTile)> {
         let (key, tile) = self.tiles.iter().find(|(key, _)| holds(*key, point))?;
         Some((*key, (*tile)?))
@@ -330,14 +345,9 @@ impl<'a> Plot<'a> {
         first && marks.all(|covers| covers)
     }
 
-    fn add_doubt(
-        &self,
-        bed: &Bed,
-        (key, point): (PageKey, IVec3),
-        scope: &Scope,
-        coarser: u8,
-        doubt: &mut Doubt,
-    ) {
+    /// Turns the doubt about what lies beneath into that about the ground with this layer on it.
+    fn add_doubt(&self, question: &Question<'_>, doubt: &mut Doubt) {
+        let &Question { key, point, scope, coarser, .. } = question;
         if key.depth() < coarser {
             // No mark speaks of as much as this page's diamonds can reach.
             let [low_m, high_m] = self.archive.height_range_m;
@@ -351,7 +361,7 @@ impl<'a> Plot<'a> {
         let Some((mark_key, Some(tile))) = tile else { return };
         let mark = tile.mark_around(*mark_key, point);
         let reading = tile.read(*mark_key, point, self.facts.quantum_m, self.grid);
-        let own = self.own_doubt(bed, (key, *mark_key), scope, &mark, &reading);
+        let own = self.own_doubt(question, *mark_key, &mark, &reading);
         if !mark.edge && reading.weight == 1.0 {
             *doubt = own;
         } else if mark.edge && mark.range[0] <= mark.range[1] {
@@ -369,12 +379,12 @@ impl<'a> Plot<'a> {
     /// What this layer alone leaves in doubt, where it has weight.
     fn own_doubt(
         &self,
-        bed: &Bed,
-        (key, mark_key): (PageKey, PageKey),
-        scope: &Scope,
+        question: &Question<'_>,
+        mark_key: PageKey,
         mark: &Mark,
         reading: &Reading,
     ) -> Doubt {
+        let &Question { bed, key, scope, .. } = question;
         let roughness = f64::from(mark.roughness) / 15.0;
         let detail = bed.detail.as_ref();
         let is_beyond = key.depth() > self.facts.depth;
@@ -426,9 +436,19 @@ pub fn geoid_doubt_m(bed: &Bed, edge_m: f64, distance_m: f64) -> [f64; 2] {
     }
 }
 
+/// Where the height of a layer comes from.
+fn origin_of(reading: &Reading) -> Origin {
+    if reading.filled { Origin::Filled } else { Origin::Measured }
+}
+
+/// A share as a byte: 255 is all of it.
+#[expect(clippy::cast_possible_truncation, reason = "clamped to a byte")]
+fn byte(share: f64) -> u8 {
+    (share.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
 /// Hidden layers of real ground. What steepness adds to rock is added with the normals.
 fn climate(style: Style, sin_lat: f64, height_m: f64, roughness: f64) -> Layers {
-    let byte = |value: f64| ((value.clamp(0.0, 1.0) * 255.0).round() as u32 & 0xFF) as u8;
     let north = sin_lat * sin_lat;
     let ramp = |low: f64, high: f64, x: f64| ((x - low) / (high - low)).clamp(0.0, 1.0);
     match style {

@@ -170,11 +170,11 @@ impl Generator {
         let doubt = plots.doubt(key, point, &scope, self.coarser());
         let [low_m, high_m] = doubt.range_m;
         let variation_m = (high_m - ground.height_m).max(ground.height_m - low_m).max(0.0);
+        let corner_m = |shore: bool| if shore { (high_m - low_m) / 4.0 } else { 0.0 };
         let error = |level: usize| {
             let [geoid_m, _] = geoid_doubt_m(&self.bed, edges_m[level], 0.0);
-            let relief_m = self.drawn(ground.height_m, variation_m, |shore| {
-                doubt.error_m[level] + if shore { (high_m - low_m) / 4.0 } else { 0.0 }
-            });
+            let error_m = |shore: bool| doubt.error_m[level] + corner_m(shore);
+            let relief_m = self.drawn(ground.height_m, variation_m, error_m);
             narrow(relief_m + geoid_m + sagitta_m[level])
         };
         let [_, sea_level_m] = geoid_doubt_m(&self.bed, 0.0, scope.reach_m);
@@ -196,19 +196,18 @@ impl Generator {
         let variation_m = planet.variation_m(scope.reach_m, ruggedness);
         let error = |level: usize| {
             let edge_m = scope.edges_m[level];
-            // Where water meets land, an edge that rises by d cuts the corner by d/4 at most.
-            let relief_m = self.drawn(ground.height_m, variation_m, |shore| {
-                let corner_m =
-                    if shore { planet.variation_m(edge_m, ruggedness) / 4.0 } else { 0.0 };
-                planet.residual_m(edge_m, ruggedness) + corner_m
-            });
+            let rise_m = || planet.variation_m(edge_m, ruggedness);
+            let corner_m = |shore: bool| if shore { rise_m() / 4.0 } else { 0.0 };
+            let error_m = |shore: bool| planet.residual_m(edge_m, ruggedness) + corner_m(shore);
+            let relief_m = self.drawn(ground.height_m, variation_m, error_m);
             narrow(relief_m + sagitta_m[level])
         };
         Bound { error_odd_m: error(0), error_even_m: error(1), variation_m: narrow(variation_m) }
     }
 
     /// The error of what is drawn: none under water, that of a shore where ground and sea level
-    /// meet within reach, else that of the ground.
+    /// meet within reach, else that of the ground. Where water meets land, an edge that rises by d
+    /// cuts the corner by d/4 at most.
     fn drawn(&self, height_m: f64, variation_m: f64, error_m: impl Fn(bool) -> f64) -> f64 {
         let drowned = self.sea && height_m + variation_m < 0.0;
         let shore = self.sea && !drowned && height_m - variation_m < 0.0;
@@ -229,11 +228,7 @@ impl Generator {
             let at = j * PAGE_SIDE + i;
             page.normals[at] = encode(normal);
             if page.survey.as_ref().is_some_and(|s| s.origin[at] != Origin::Procedural) {
-                let flat = normal.dot(up);
-                let steep = (1.0 - flat * flat).max(0.0);
-                let share = steep / (steep + STEEP * STEEP);
-                let rock = f64::from(page.layers[at][1]) + 0.9 * 255.0 * share;
-                page.layers[at][1] = (rock.min(255.0).round() as u32 & 0xFF) as u8;
+                page.layers[at][1] = bared(page.layers[at][1], normal.dot(up));
             }
         }
     }
@@ -270,6 +265,15 @@ fn place_within(key: PageKey, point: IVec3) -> Option<usize> {
     let inside = |along: i32| (0..=key.side()).contains(&along);
     let place = |along: i32| usize::try_from(along / key.step()).expect("inside the page");
     (inside(u - u0) && inside(v - v0)).then(|| place(v - v0) * PAGE_SIDE + place(u - u0))
+}
+
+/// Rock, with what steepness bares of it; `flat` is the cosine of the slope.
+#[expect(clippy::cast_possible_truncation, reason = "at most 255")]
+fn bared(rock: u8, flat: f64) -> u8 {
+    let steep = (1.0 - flat * flat).max(0.0);
+    let share = steep / (steep + STEEP * STEEP);
+    let rock = f64::from(rock) + 0.9 * 255.0 * share;
+    rock.min(255.0).round() as u8
 }
 
 /// A unit vector in octahedral encoding, ±32767 is ±1. Error: 4e-5 rad.

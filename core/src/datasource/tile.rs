@@ -326,7 +326,7 @@ mod tests {
             quanta,
             weights: None,
             filled: None,
-            sea_level: (0..side * side).map(|at| at as i32 * 31 % 977).collect(),
+            sea_level: (0..).take(side * side).map(|at| at * 31 % 977).collect(),
             marks: Box::new([Mark::default(); MARK_SIDE * MARK_SIDE]),
         }
     }
@@ -355,7 +355,8 @@ mod tests {
             let cell = (key.side() >> (side - 1).ilog2()).max(crate::lattice::RADIUS >> grid);
             let (u0, v0) = key.origin();
             let (u0, v0) = (u0 / cell * cell, v0 / cell * cell);
-            let places = (0..side as i32).flat_map(|j| (0..side as i32).map(move |i| (i, j)));
+            let along = 0..i32::try_from(side).unwrap();
+            let places = along.clone().flat_map(|j| along.clone().map(move |i| (i, j)));
             tile.sea_level = places.map(|(i, j)| height(u0 + i * cell, v0 + j * cell)).collect();
             tile
         };

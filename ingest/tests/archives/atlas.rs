@@ -15,7 +15,7 @@ use overfly_core::datasource::{Page, PageKey};
 use overfly_core::digest::mix;
 use overfly_core::geodesy::trig::{atan2, hypot};
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
-use overfly_core::ground::{Ground, Place, Query};
+use overfly_core::ground::{Ground, Place};
 use overfly_core::lattice::{fold, normal_of};
 use overfly_core::settings::{
     DepthSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings,
@@ -172,11 +172,9 @@ impl Atlas {
         ground
     }
 
-    /// Height above the ellipsoid at one place, at a page depth's even level.
-    pub fn height_m(&self, at: Geodetic, depth: u8) -> f64 {
-        let mut ground = self.bare();
-        ground.insert(self.page(Place::of(at.normal()).page(depth)));
-        ground.height(at, Query::Exact(even(depth))).ok().unwrap().height_m
+    /// The quantum of a layer of the topmost archive.
+    pub fn quantum_m(&self, layer: usize) -> f64 {
+        self.generator.archives()[0].layers[layer].quantum_m
     }
 }
 

@@ -15,6 +15,7 @@ mod bounds;
 mod layers;
 mod pages;
 mod rasters;
+mod probe;
 mod real;
 mod robust;
 mod seams;

@@ -69,10 +69,9 @@ impl Detail {
         let mut height_m = 0.0;
         for four in self.fours.iter().filter(|four| four.wavelengths_m[3] <= step_m) {
             let values = four.lattices.fine_values(at_m);
-            for (wavelength_m, value) in four.wavelengths_m.into_iter().zip(values) {
-                if wavelength_m <= step_m {
-                    height_m += self.amplitude_m(wavelength_m, roughness) * value;
-                }
+            let waves = four.wavelengths_m.into_iter().zip(values);
+            for (wavelength_m, value) in waves.filter(|(length_m, _)| *length_m <= step_m) {
+                height_m += self.amplitude_m(wavelength_m, roughness) * value;
             }
         }
         height_m * fade
