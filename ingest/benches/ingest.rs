@@ -47,6 +47,7 @@ fn options(inputs: Vec<PathBuf>, folder: &Path) -> BuildOptions {
         geoid: None,
         blend_m: None,
         level_max: None,
+        density: None,
     }
 }
 

@@ -21,6 +21,9 @@ pub const FINE: f64 = 65_536.0;
 /// Postings read for one block at most; larger blocks are cut.
 const POSTINGS_MAX: usize = 6 << 20;
 
+/// Share of a blend over which weight stays full outside a raster: some lattice points.
+const PLATEAU: f64 = 0.25;
+
 /// A raster of a layer, finest first within it.
 pub struct Sheet<'a> {
     /// The raster.
@@ -175,6 +178,9 @@ impl Sheet<'_> {
         let last = [f64::from(grid.columns) - 1.0, f64::from(grid.rows) - 1.0];
         let (mut outside_m, mut inside_m) = (0.0_f64, f64::MAX);
         let mut held = place;
+        // Meridians come together towards the poles.
+        let middle = grid.lon_lat(0.0, 0.5 * last[1])[1];
+        let narrowing = cos(lon_lat[1]).max(0.0) / cos(middle).max(1e-3);
         for axis in 0..2 {
             let round = axis == 0 && grid.wraps;
             let polar = axis == 1 && grid.wraps && self.reaches_pole(place[1] > 0.5 * last[1]);
@@ -183,15 +189,17 @@ impl Sheet<'_> {
             }
             // Half a nanoposting keeps borders that are equal on paper equal in binary.
             let beyond = (-place[axis]).max(place[axis] - last[axis]) - 1e-6;
-            outside_m = outside_m.max(beyond * self.spacing_m[axis]);
+            let posting_m = self.spacing_m[axis] * if axis == 0 { narrowing } else { 1.0 };
+            outside_m = outside_m.max(beyond * posting_m);
             let within = place[axis].min(last[axis] - place[axis]).max(0.0);
-            inside_m = inside_m.min(within * self.spacing_m[axis]);
+            inside_m = inside_m.min(within * posting_m);
             held[axis] = place[axis].clamp(0.0, last[axis]);
         }
         if outside_m >= blend_m {
             return None;
         }
-        let fall = (outside_m / blend_m).max(0.0);
+        // Full weight goes on a little, so that border postings have it all around.
+        let fall = ((outside_m / blend_m - PLATEAU) / (1.0 - PLATEAU)).max(0.0);
         let inside = outside_m <= 0.0;
         let inner = if inside { (inside_m / blend_m).min(1.0) } else { 0.0 };
         Some(Stand { place: held, weight: 1.0 - fall * fall * (3.0 - 2.0 * fall), inner, inside })
@@ -310,7 +318,7 @@ impl Layer<'_> {
             for &(index, share, place) in &shares {
                 let window = windows[index].as_ref().expect("a share has a window");
                 let place = spans[index].unrolled(place, &self.sheets[index].raster.grid);
-                height_m += share * window.cubic(place);
+                height_m += share * window.bilinear(place);
                 block.filled[at] |= share >= 0.5 && window.is_void(place);
             }
             block.heights[at] = fine(height_m);
@@ -318,14 +326,14 @@ impl Layer<'_> {
         }
         for (index, window) in windows.iter().enumerate() {
             if let Some(window) = window {
-                self.gather(index, window, square, &mut block.postings);
+                self.gather(index, window, square, &mut block);
             }
         }
         Ok(Some(block))
     }
 
     /// The postings of a window that are seen and lie in the square.
-    fn gather(&self, index: usize, window: &Window, square: &Square, out: &mut Vec<Posting>) {
+    fn gather(&self, index: usize, window: &Window, square: &Square, block: &mut Block) {
         let grid = &self.sheets[index].raster.grid;
         let alone = self.sheets.len() == 1;
         let meridians = window.meridians(grid);
@@ -335,21 +343,29 @@ impl Layer<'_> {
                 continue;
             }
             let lat = grid.lon_lat(0.0, row as f64)[1];
-            let (sin_lat, cos_lat) = (sin(lat), cos(lat));
-            let place = |meridian: &Meridian| j * window.width + meridian.column;
-            let is_seen = |meridian: &&Meridian| {
-                let whole = !window.void[place(meridian)];
-                whole && (alone || self.shows(index, [meridian.lon_rad, lat]))
-            };
-            for meridian in meridians.iter().filter(is_seen) {
-                let (cos_lon, sin_lon) = (meridian.cos, meridian.sin);
-                let normal = DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
-                let height = fine(f64::from(window.heights_m[place(meridian)]));
-                out.extend(
-                    square.places(self.grid, normal).map(|place| posting(square, place, height)),
-                );
+            let parallel = [cos(lat), sin(lat)];
+            for meridian in &meridians {
+                let place = j * window.width + meridian.column;
+                let hidden = || !alone && !self.shows(index, [meridian.lon_rad, lat]);
+                if window.void[place] || hidden() {
+                    continue;
+                }
+                let normal = meridian.normal(parallel);
+                let height_m = f64::from(window.heights_m[place]);
+                self.put(square, normal, height_m, &mut block.postings);
             }
         }
+    }
+
+    fn put(&self, square: &Square, normal: DVec3, height_m: f64, out: &mut Vec<Posting>) {
+        let height = fine(height_m);
+        out.extend(square.places(self.grid, normal).map(|place| posting(square, place, height)));
+    }
+}
+
+impl Meridian {
+    fn normal(&self, [cos_lat, sin_lat]: [f64; 2]) -> DVec3 {
+        DVec3::new(cos_lat * self.cos, cos_lat * self.sin, sin_lat)
     }
 }
 
@@ -415,7 +431,7 @@ impl Span {
         [x - turn * ((x - middle) / turn).round(), y]
     }
 
-    /// First posting and size of the window, with what the cubic needs around.
+    /// First posting and size of the window, with some room around.
     fn window(&self, grid: &Grid) -> Option<([i64; 2], [usize; 2])> {
         let [columns, rows] = self.range?;
         #[expect(clippy::cast_possible_truncation, reason = "places lie in the raster")]
@@ -458,26 +474,14 @@ impl Window {
         (cell, part)
     }
 
-    /// Catmull and Rom's cubic through the sixteen postings around a place.
-    fn cubic(&self, place: [f64; 2]) -> f64 {
-        let ([column, row], part) = self.cell(place);
-        let [across, along] = part.map(|t| {
-            let (t2, t3) = (t * t, t * t * t);
-            [
-                -0.5 * t + t2 - 0.5 * t3,
-                1.0 - 2.5 * t2 + 1.5 * t3,
-                0.5 * t + 2.0 * t2 - 1.5 * t3,
-                -0.5 * t2 + 0.5 * t3,
-            ]
-        });
-        let mut sum = 0.0;
-        for (j, along) in along.into_iter().enumerate() {
-            let first = (row + j - 1) * self.width + column - 1;
-            for (i, across) in across.into_iter().enumerate() {
-                sum += along * across * f64::from(self.heights_m[first + i]);
-            }
-        }
-        sum
+    /// Between the four postings around a place: what is commonly taken for the ground there.
+    fn bilinear(&self, place: [f64; 2]) -> f64 {
+        let ([column, row], [a, b]) = self.cell(place);
+        let first = row * self.width + column;
+        let at = |at: usize| f64::from(self.heights_m[at]);
+        let lower = at(first) * (1.0 - a) + at(first + 1) * a;
+        let upper = at(first + self.width) * (1.0 - a) + at(first + self.width + 1) * a;
+        lower * (1.0 - b) + upper * b
     }
 
     fn is_void(&self, place: [f64; 2]) -> bool {

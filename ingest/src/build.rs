@@ -40,9 +40,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const POINTS_A_POSTING: f64 = 1.25;
 /// Width of a blend in postings, unless another is asked for.
 const BLEND_POSTINGS: f64 = 8.0;
+const BLEND_LEAST_M: f64 = 1e-3;
 /// Quanta of heights in whole metres and of others, and per metre of spacing at least.
 const QUANTUM_M: [f64; 2] = [1.0, 0.1];
 const QUANTUM_A_METRE: f64 = 3e-4;
+const QUANTUM_MOST_M: f64 = 100.0;
 /// Postings of whole metres are met to this.
 const SLACK_M: f64 = 0.25;
 /// From this spacing on the geoid's own nodes may lie a degree apart.
@@ -68,6 +70,9 @@ pub struct BuildOptions {
     pub blend_m: Option<f64>,
     /// Deepest lattice level; without one what the postings ask for.
     pub level_max: Option<u8>,
+    /// Lattice points a posting at least; without a number 1.25. More cost bytes, and keep the
+    /// ground between postings nearer to straight lines.
+    pub density: Option<f64>,
 }
 
 /// How far a build has come.
@@ -141,8 +146,8 @@ pub fn build(
         (0..).zip(&plans).map(|(i, plan)| making(options, &sources, i, plan)).collect();
     make(&makings, &spool, stop, progress)
         .map_err(|error| IngestError::made(error, &options.output))?;
-    let geoid = geoid(options, &plans)?;
-    let desk = Desk { options, plans: &plans, spool: &spool, geoid };
+    let geoids = geoids(options)?;
+    let desk = Desk { options, plans: &plans, spool: &spool, geoids, stop };
     let part = tempfile::Builder::new()
         .prefix(".overfly-")
         .suffix(".part")
@@ -187,7 +192,7 @@ pub fn sources(
     for (raster, done) in rasters.into_iter().zip(1..) {
         let survey = Survey::of(&raster, stop)?.ok_or(IngestError::Stopped)?;
         let spacing_m = raster.grid.spacing_m(radius_m);
-        let depth = depth_of(&raster, spacing_m, &options.body.1, options.level_max);
+        let depth = depth_of(&raster, spacing_m, options);
         sources.push(Source { raster, survey, spacing_m, depth });
         progress(Progress::Looking(done, total));
     }
@@ -195,7 +200,9 @@ pub fn sources(
 }
 
 /// The depth whose samples are dense enough for the raster's postings.
-fn depth_of(raster: &Raster, spacing_m: [f64; 2], body: &Ellipsoid, level_max: Option<u8>) -> u8 {
+fn depth_of(raster: &Raster, spacing_m: [f64; 2], options: &BuildOptions) -> u8 {
+    let (body, level_max) = (&options.body.1, options.level_max);
+    let points = options.density.unwrap_or(POINTS_A_POSTING);
     let grid = &raster.grid;
     let middle = grid.lon_lat(0.5 * f64::from(grid.columns - 1), 0.5 * f64::from(grid.rows - 1));
     let normal =
@@ -210,7 +217,7 @@ fn depth_of(raster: &Raster, spacing_m: [f64; 2], body: &Ellipsoid, level_max: O
         level_max.map_or(DEPTH_MAX, |level| (level / 2).saturating_sub(PAGE_BITS).min(DEPTH_MAX));
     let enough = |depth: &u8| {
         let step = 1.0 / f64::from(1_u32 << (depth + PAGE_BITS));
-        share * (body.a_m * step) * (body.a_m * step) * POINTS_A_POSTING <= posting_m2
+        share * (body.a_m * step) * (body.a_m * step) * points <= posting_m2
     };
     (0..most).find(enough).unwrap_or(most)
 }
@@ -240,9 +247,11 @@ pub fn plans(options: &BuildOptions, sources: &[Source]) -> Result<Vec<Plan>, In
         Plan {
             facts: LayerFacts {
                 depth,
-                quantum_m: QUANTUM_M[usize::from(!whole)].max(spacing_m * QUANTUM_A_METRE),
+                quantum_m: QUANTUM_M[usize::from(!whole)]
+                    .max(spacing_m * QUANTUM_A_METRE)
+                    .min(QUANTUM_MOST_M),
                 spacing_m,
-                blend_m: options.blend_m.unwrap_or(BLEND_POSTINGS * spacing_m),
+                blend_m: options.blend_m.unwrap_or(BLEND_POSTINGS * spacing_m).max(BLEND_LEAST_M),
                 sources: own.iter().map(name).collect(),
             },
             slack_m: if whole { SLACK_M } else { 0.0 },
@@ -301,16 +310,16 @@ fn make(
     Ok(())
 }
 
-fn geoid(options: &BuildOptions, plans: &[Plan]) -> Result<Option<Geoid>, IngestError> {
+/// The geoid for fine and for coarse layers.
+fn geoids(options: &BuildOptions) -> Result<Option<[Geoid; 2]>, IngestError> {
     if options.datum == Datum::Ellipsoid {
         return Ok(None);
     }
     if let Some(path) = &options.geoid {
-        return Ok(Some(Geoid::from_gtx(path)?));
+        return Ok(Some([Geoid::from_gtx(path)?, Geoid::from_gtx(path)?]));
     }
-    let finest_m = plans.iter().map(|plan| plan.facts.spacing_m).fold(f64::MAX, f64::min);
-    let spacing = if finest_m < COARSE_M { NodeSpacing::Arcmin15 } else { NodeSpacing::Degree1 };
-    Ok(Some(Geoid::egm96_spaced(spacing)))
+    let spaced = |spacing| Geoid::egm96_spaced(spacing);
+    Ok(Some([spaced(NodeSpacing::Arcmin15), spaced(NodeSpacing::Degree1)]))
 }
 
 /// What tiles are written from.
@@ -318,7 +327,9 @@ struct Desk<'a> {
     options: &'a BuildOptions,
     plans: &'a [Plan],
     spool: &'a Spool,
-    geoid: Option<Geoid>,
+    /// For fine layers, and for coarse ones.
+    geoids: Option<[Geoid; 2]>,
+    stop: &'a AtomicBool,
 }
 
 impl Desk<'_> {
@@ -332,6 +343,9 @@ impl Desk<'_> {
         let refused = |error| IngestError::Archive { path: self.options.output.clone(), error };
         let mut facts = self.facts();
         let keys = self.keys();
+        if keys.is_empty() {
+            return Err(IngestError::NoInput);
+        }
         let writer = PmTilesWriter::new(TileType::Unknown).tile_compression(Compression::None);
         let mut writer = writer.create(file).map_err(refused)?;
         let (mut content, mut range_m) = (Chain::default(), [f64::MAX, f64::MIN]);
@@ -425,7 +439,7 @@ impl Desk<'_> {
                 f64::from(record.quanta[0][j * PAGE_SIDE + i]) * plan.quantum_m
             };
             let roughness: &[u8; MARKS] = &record.roughness[0];
-            let sea_level = self.sea_level(key, sea_level_grid(plan.depth), &record)?;
+            let sea_level = self.sea_level(key, plan, &record)?;
             let [low, high] = [sea_level.iter().min(), sea_level.iter().max()]
                 .map(|level| f64::from(level.copied().unwrap_or(0)) * SEA_LEVEL_UNIT_M);
             for at in (0..SAMPLES).filter(|&at| record.weights[0][at] > 0) {
@@ -470,8 +484,15 @@ impl Desk<'_> {
     }
 
     /// Sea level where the layer is seen; elsewhere whatever costs least.
-    fn sea_level(&self, key: PageKey, grid: u8, record: &Record) -> Result<Vec<i32>, IngestError> {
-        let Some(geoid) = &self.geoid else { return Ok(Vec::new()) };
+    fn sea_level(
+        &self,
+        key: PageKey,
+        layer: &LayerFacts,
+        record: &Record,
+    ) -> Result<Vec<i32>, IngestError> {
+        let Some([fine, coarse]) = &self.geoids else { return Ok(Vec::new()) };
+        let geoid = if layer.spacing_m < COARSE_M { fine } else { coarse };
+        let grid = sea_level_grid(layer.depth);
         if record.weights[0].iter().all(|&weight| weight == 0) {
             return Ok(Vec::new());
         }
@@ -488,10 +509,15 @@ impl Desk<'_> {
         });
         for (i, j) in corners {
             let level = &mut levels[j * side + i];
-            if level.is_none() {
-                let point = fold(key.quadrant(), u0 + along(i), v0 + along(j));
-                *level = Some(level_at(geoid, point)?);
+            if level.is_some() {
+                continue;
             }
+            // Harmonics take a millisecond each, so a stop is heard here too.
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(IngestError::Stopped);
+            }
+            let point = fold(key.quadrant(), u0 + along(i), v0 + along(j));
+            *level = Some(level_at(geoid, point)?);
         }
         let mut before = levels.iter().flatten().next().copied().unwrap_or(0);
         let mut known = |level: Option<i32>| {

@@ -79,7 +79,7 @@ impl From<RasterError> for IngestError {
 impl fmt::Display for IngestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoInput => f.write_str("no raster among the inputs"),
+            Self::NoInput => f.write_str("no height in the inputs, or no raster among them"),
             Self::Raster(error) => error.fmt(f),
             Self::Layers { found } => {
                 write!(f, "inputs of {found} different resolutions; an archive has 16 layers")

@@ -7,14 +7,14 @@
 //! Source: Gilbert 1972 (simultaneous iterative reconstruction), over-relaxed.
 //!
 //! The lattice has more points than there are postings, so there are many surfaces that meet them
-//! all; the first heights, a cubic through the postings, are smooth already, and what is left is
+//! all; the first heights lie between the four postings around, and what is left is
 //! spread over each triangle's corners. Everything is whole numbers, whose sums do not depend on
 //! their order: so two blocks that share a point move it by the same, as long as their margins are
 //! wider than [`ROUNDS`] steps.
 
 use crate::block::{Block, FINE};
 
-/// Rounds of moving. After 10 the postings of a 3″ tile are met to 4 mm rms, from 0.6 m.
+/// Rounds of moving.
 pub const ROUNDS: usize = 24;
 
 /// Holds points in place that hardly any posting weighs on, in 1/65536 of a posting: they would

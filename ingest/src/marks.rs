@@ -81,6 +81,7 @@ pub fn marks(
             around.range_m =
                 [around.range_m[0].min(stat.range_m[0]), around.range_m[1].max(stat.range_m[1])];
             around.full &= stat.full;
+            around.roughest = around.roughest.max(stat.roughest);
         }
         let own_m = height_m(place[0] * MARK_STRIDE, place[1] * MARK_STRIDE);
         *mark = mark_of(&around, own_m, roughness[at]);
@@ -105,6 +106,7 @@ fn mark_of(around: &Stat, own_m: f64, roughness: u8) -> Mark {
         variation: if edge { 0 } else { bound((high_m - own_m).max(own_m - low_m)) },
         slope: bound(f64::from(around.slope_m)),
         roughness,
+        roughest: u8::try_from(around.roughest).expect("at most 15").max(roughness),
         edge,
         range: match (edge, seen) {
             (false, _) => [0; 2],

@@ -179,6 +179,10 @@ impl Making<'_> {
                 *stat = nodes.stat([a, b]);
                 stat.centre_m = nodes.centre_m([a, b]);
                 stat.error_m = [nodes.odd_m([a, b]), 0.0];
+                let first = b * MARK_SIDE + a;
+                let corners = [first, first + 1, first + MARK_SIDE, first + MARK_SIDE + 1];
+                let roughest = corners.into_iter().map(|mark| record.roughness[0][mark]).max();
+                stat.roughest = roughest.map_or(0, u32::from);
             }
         }
         record
@@ -291,6 +295,7 @@ fn joined(parts: &[Stat]) -> Stat {
         whole.range_m =
             [whole.range_m[0].min(part.range_m[0]), whole.range_m[1].max(part.range_m[1])];
         whole.full &= part.full;
+        whole.roughest = whole.roughest.max(part.roughest);
     }
     whole
 }

@@ -35,6 +35,8 @@ pub struct Stat {
     pub range_m: [f32; 2],
     /// 1 where all samples have full weight.
     pub full: u32,
+    /// Greatest roughness at its corners.
+    pub roughest: u32,
 }
 
 /// One layer of one tile.
@@ -69,6 +71,7 @@ impl Stat {
         slope_m: 0.0,
         range_m: [f32::MAX, f32::MIN],
         full: 0,
+        roughest: 0,
     };
 }
 

@@ -157,7 +157,9 @@ impl Survey {
             }
             let place = [at % width, at / width].map(|along| i64::try_from(along).expect("small"));
             let coarse_m = self.coarse.at([start[0] + place[0], start[1] + place[1]]);
-            let share = f32::from(rounds[at]) / f32::from(last);
+            // Near heights they alone count: a narrow void is bridged.
+            let share = 2.0 * f32::from(rounds[at]) / f32::from(last) - 1.0;
+            let share = share.max(0.0);
             *height_m = if is_far { coarse_m } else { *height_m + (coarse_m - *height_m) * share };
         }
     }

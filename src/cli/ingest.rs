@@ -56,6 +56,10 @@ pub struct Arguments {
     /// Deepest lattice level to make, 12 to 58. [default: what the postings ask for]
     #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(u8).range(12..=58))]
     level: Option<u8>,
+    /// Lattice points a posting at least, 0.5 to 16: more cost bytes and keep the ground between
+    /// postings nearer to straight lines. [default: 1.25]
+    #[arg(long, value_name = "POINTS", value_parser = parse_density)]
+    density: Option<f64>,
     /// How PNG tiles hold heights.
     #[arg(long, value_enum)]
     encoding: Option<EncodingName>,
@@ -118,6 +122,13 @@ fn parse_positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value <= 1e6 => Ok(value),
         _ => Err(format!("`{text}` is not a number above 0 and up to 1e6")),
+    }
+}
+
+fn parse_density(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.5..=16.0).contains(&value) => Ok(value),
+        _ => Err(format!("`{text}` is not a number from 0.5 to 16")),
     }
 }
 
@@ -221,6 +232,7 @@ fn options(arguments: &Arguments) -> BuildOptions {
         geoid: arguments.geoid.clone(),
         blend_m: arguments.blend,
         level_max: arguments.level,
+        density: arguments.density,
     }
 }
 

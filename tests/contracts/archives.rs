@@ -8,11 +8,12 @@
 use super::command_line::{Outcome, command, overfly};
 use super::flights::Tour;
 use super::hills::Hills;
-use super::server::Server;
+use super::server::{Server, Stall};
 use overfly::archive::OpenOptions;
 use overfly::core::datasource::PageKey;
 use overfly::core::datasource::page::Origin;
 use overfly::{OpenError, Overfly, config};
+use std::io::{BufRead, BufReader, Read};
 use std::time::Duration;
 
 fn open_error(scene: &str) -> String {
@@ -149,24 +150,32 @@ fn hills_of_file(hills: &Hills) -> String {
 #[test]
 fn a_replay_finishes_although_the_server_dies_under_way() {
     let hills = Hills::new();
+    // A flight in a file asks nothing of the ground before its first frame.
+    let flight = hills.folder().join("poles.ovf");
+    Tour::new("poles", "small", 0).flight.write(&flight).unwrap();
     let server = Server::new(std::fs::read(hills.archive()).unwrap());
     hills.write_scene(&server.url());
-    let child = command()
-        .args(["replay", "poles", "--no-render", "--frames", "0..400", "--workers", "0", "--scene"])
+    // Slow enough that it dies while the first page is on its way.
+    server.change(|it| it.stall = Some(Stall::Header));
+    let mut child = command()
+        .arg("replay")
+        .arg(&flight)
+        .args(["--no-render", "--frames", "0..400", "--workers", "0", "--scene"])
         .arg(hills.scene())
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    while server.requests() < 4 {
-        std::thread::yield_now();
-    }
-    server.change(|it| it.failing = u32::MAX);
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    let mut text = String::new();
+    out.read_line(&mut text).unwrap();
+    assert!(text.contains("poles over"), "{text}");
+    server.change(|it| (it.failing, it.stall) = (u32::MAX, None));
+    out.read_to_string(&mut text).unwrap();
     let done = child.wait_with_output().unwrap();
     let err = String::from_utf8_lossy(&done.stderr);
-    let out = String::from_utf8_lossy(&done.stdout);
-    assert_eq!(done.status.code(), Some(0), "{out}{err}");
-    assert!(out.contains("of 400 frames") && err.contains(&server.url()), "{out}{err}");
+    assert_eq!(done.status.code(), Some(0), "{text}{err}");
+    assert!(text.contains("of 400 frames") && err.contains(&server.url()), "{text}{err}");
 }
 
 #[test]

@@ -213,7 +213,7 @@ struct Contexts {
     weight: [Number; 3],
     filled: [Bit; 4],
     sea: [Number; 3],
-    mark: [Number; 5],
+    mark: [Number; 6],
     edge: [Bit; 2],
     range: [Number; 2],
 }
@@ -227,7 +227,7 @@ impl Contexts {
             weight: [Number::NEW; 3],
             filled: [Bit::NEW; 4],
             sea: [Number::NEW; 3],
-            mark: [Number::NEW; 5],
+            mark: [Number::NEW; 6],
             edge: [Bit::NEW; 2],
             range: [Number::NEW; 2],
         }
@@ -405,6 +405,7 @@ impl Contexts {
             byte(2, &mut mark.variation, near.variation);
             byte(3, &mut mark.slope, near.slope);
             byte(4, &mut mark.roughness, near.roughness);
+            byte(5, &mut mark.roughest, near.roughest);
             mark.edge = stream.bit(&mut self.edge[usize::from(near.edge)], mark.edge);
             for (which, near) in near.range.into_iter().enumerate().filter(|_| mark.edge) {
                 let left = i32::from(mark.range[which]) - i32::from(near);

@@ -57,6 +57,8 @@ pub struct Ground {
 pub struct Doubt {
     /// Least and greatest height within reach, above sea level.
     pub range_m: [f64; 2],
+    /// Greatest difference between the ground at a diamond's centre and within its reach.
+    pub variation_m: f64,
     /// Bounds for triangles of odd and even levels.
     pub error_m: [f64; 2],
 }
@@ -277,11 +279,11 @@ impl<'a> Plots<'a> {
 
     fn doubt_of_planet(&self, point: IVec3, scope: &Scope) -> Doubt {
         let Some(planet) = &self.bed.planet else {
-            return Doubt { range_m: [0.0; 2], error_m: [0.0; 2] };
+            return Doubt { range_m: [0.0; 2], variation_m: 0.0, error_m: [0.0; 2] };
         };
         // Where real ground covers it all around, the planet does not matter.
         if self.plots.iter().any(|plot| plot.covers_around(point)) {
-            return Doubt { range_m: [0.0; 2], error_m: [0.0; 2] };
+            return Doubt { range_m: [0.0; 2], variation_m: 0.0, error_m: [0.0; 2] };
         }
         let sample = planet.sample(normal_of(point));
         let slope = planet.ruggedness_slope_per_m();
@@ -289,6 +291,7 @@ impl<'a> Plots<'a> {
         let variation_m = planet.variation_m(scope.reach_m, ruggedness);
         Doubt {
             range_m: [sample.height_m - variation_m, sample.height_m + variation_m],
+            variation_m,
             error_m: scope.edges_m.map(|edge_m| planet.residual_m(edge_m, ruggedness)),
         }
     }
@@ -351,8 +354,11 @@ impl<'a> Plot<'a> {
         if key.depth() < coarser {
             // No mark speaks of as much as this page's diamonds can reach.
             let [low_m, high_m] = self.archive.height_range_m;
-            doubt.range_m = [doubt.range_m[0].min(low_m), doubt.range_m[1].max(high_m)];
+            let geoid_m = if self.archive.datum == Datum::Egm96 { GEOID_MOST_M / 2.0 } else { 0.0 };
+            let [least_m, most_m] = doubt.range_m;
+            doubt.range_m = [least_m.min(low_m - geoid_m), most_m.max(high_m + geoid_m)];
             let most_m = doubt.range_m[1] - doubt.range_m[0];
+            doubt.variation_m = most_m;
             doubt.error_m = doubt.error_m.map(|error_m| error_m + most_m);
             return;
         }
@@ -361,18 +367,20 @@ impl<'a> Plot<'a> {
         let Some((mark_key, Some(tile))) = tile else { return };
         let mark = tile.mark_around(*mark_key, point);
         let reading = tile.read(*mark_key, point, self.facts.quantum_m, self.grid);
-        let own = self.own_doubt(question, *mark_key, &mark, &reading);
+        let around_m = tile.range_around(*mark_key, point, self.facts.quantum_m);
+        let own = self.own_doubt(question, *mark_key, (&mark, around_m), &reading);
         if !mark.edge && reading.weight == 1.0 {
             *doubt = own;
         } else if mark.edge && mark.range[0] <= mark.range[1] {
             let [low_m, high_m] = own.range_m;
             let difference_m = (high_m - doubt.range_m[0]).max(doubt.range_m[1] - low_m).max(0.0);
             for (level, edge_m) in scope.edges_m.into_iter().enumerate() {
-                let change = 2.0 * edge_m / self.facts.blend_m + 2.0 / f64::from(FULL);
+                let change = 2.5 * edge_m / self.facts.blend_m + 2.0 / f64::from(FULL);
                 let mixed_m = doubt.error_m[level].max(own.error_m[level]);
                 doubt.error_m[level] = mixed_m + change.min(1.0) * difference_m;
             }
             doubt.range_m = [doubt.range_m[0].min(low_m), doubt.range_m[1].max(high_m)];
+            doubt.variation_m = doubt.range_m[1] - doubt.range_m[0];
         }
     }
 
@@ -381,15 +389,15 @@ impl<'a> Plot<'a> {
         &self,
         question: &Question<'_>,
         mark_key: PageKey,
-        mark: &Mark,
+        (mark, around_m): (&Mark, [f64; 2]),
         reading: &Reading,
     ) -> Doubt {
         let &Question { bed, key, scope, .. } = question;
-        let roughness = f64::from(mark.roughness) / 15.0;
+        let roughness = f64::from(mark.roughest) / 15.0;
         let detail = bed.detail.as_ref();
         let is_beyond = key.depth() > self.facts.depth;
         let mut error_m = [mark.error_odd, mark.error_even].map(metres_of);
-        let mut variation_m = metres_of(mark.variation);
+        let mut variation_m = around_m[1] - around_m[0];
         let most_m = detail.map_or(0.0, |detail| detail.most_m(self.step_m, roughness));
         if is_beyond {
             // A walk of L along a face is at most √2·L steps along its axes.
@@ -412,10 +420,12 @@ impl<'a> Plot<'a> {
         let range_m = if mark.edge {
             let [low, high] = mark.range.map(|unit| f64::from(unit) * RANGE_UNIT_M);
             [low - most_m, high + most_m]
-        } else {
+        } else if is_beyond {
             [reading.weighted_m - variation_m, reading.weighted_m + variation_m]
+        } else {
+            [around_m[0] - most_m, around_m[1] + most_m]
         };
-        Doubt { range_m, error_m }
+        Doubt { range_m, variation_m, error_m }
     }
 
     /// Lines straight on the lattice are not quite straight in space: along an edge e the two

@@ -169,7 +169,7 @@ impl Generator {
         }
         let doubt = plots.doubt(key, point, &scope, self.coarser());
         let [low_m, high_m] = doubt.range_m;
-        let variation_m = (high_m - ground.height_m).max(ground.height_m - low_m).max(0.0);
+        let variation_m = doubt.variation_m;
         let corner_m = |shore: bool| if shore { (high_m - low_m) / 4.0 } else { 0.0 };
         let error = |level: usize| {
             let [geoid_m, _] = geoid_doubt_m(&self.bed, edges_m[level], 0.0);

@@ -73,6 +73,8 @@ pub struct Mark {
     pub slope: u8,
     /// How rough the ground is, 0 to 15: what finer detail grows with.
     pub roughness: u8,
+    /// The greatest roughness around.
+    pub roughest: u8,
     /// Whether the layer has less than full weight somewhere around.
     pub edge: bool,
     /// At an edge: least and greatest height where it has weight, in [`RANGE_UNIT_M`], rounded
@@ -209,18 +211,27 @@ impl LayerTile {
     /// The worst of the marks around a lattice point of the tile.
     pub fn mark_around(&self, key: PageKey, point: IVec3) -> Mark {
         let spot = Spot::new(key, point);
-        let ends = |at: usize, more: bool| {
-            let next = at + usize::from(more);
-            [at / MARK_STRIDE, next.div_ceil(MARK_STRIDE).min(MARK_SIDE - 1)]
-        };
         let mut worst: Option<Mark> = None;
-        for row in ends(spot.row, spot.along[1] > 0) {
-            for column in ends(spot.column, spot.along[0] > 0) {
-                let mark = self.marks[row * MARK_SIDE + column];
-                worst = Some(worst.map_or(mark, |worst| worst.worse(mark)));
-            }
+        for at in spot.marks() {
+            let mark = self.marks[at];
+            worst = Some(worst.map_or(mark, |worst| worst.worse(mark)));
         }
         worst.expect("four marks")
+    }
+
+    /// Least and greatest height that the marks around a lattice point speak of, in metres; only
+    /// where none of them is at an edge.
+    pub fn range_around(&self, key: PageKey, point: IVec3, quantum_m: f64) -> [f64; 2] {
+        let spot = Spot::new(key, point);
+        let mut range_m = [f64::MAX, f64::MIN];
+        for at in spot.marks() {
+            let (i, j) = (at % MARK_SIDE * MARK_STRIDE, at / MARK_SIDE * MARK_STRIDE);
+            let height_m = f64::from(self.quanta[j * PAGE_SIDE + i]) * quantum_m;
+            let variation_m = metres_of(self.marks[at].variation);
+            let [low_m, high_m] = range_m;
+            range_m = [low_m.min(height_m - variation_m), high_m.max(height_m + variation_m)];
+        }
+        range_m
     }
 
     /// Roughness at a place of the tile, 0 to 1: bilinear between marks.
@@ -255,6 +266,7 @@ impl Mark {
             variation: self.variation.max(other.variation),
             slope: self.slope.max(other.slope),
             roughness: self.roughness.max(other.roughness),
+            roughest: self.roughest.max(other.roughest),
             edge: self.edge || other.edge,
             range,
         }
@@ -274,6 +286,17 @@ impl Spot {
         };
         let ((column, a), (row, b)) = (place(u - u0), place(v - v0));
         Self { column, row, along: [a, b], parts: i64::from(step) }
+    }
+
+    /// The marks around the place: four, or the same one several times.
+    fn marks(&self) -> [usize; 4] {
+        let ends = |at: usize, more: bool| {
+            let next = at + usize::from(more);
+            [at / MARK_STRIDE, next.div_ceil(MARK_STRIDE).min(MARK_SIDE - 1)]
+        };
+        let columns = ends(self.column, self.along[0] > 0);
+        let [first, last] = ends(self.row, self.along[1] > 0).map(|row| row * MARK_SIDE);
+        [first + columns[0], first + columns[1], last + columns[0], last + columns[1]]
     }
 
     /// The corners of the triangle that holds the place, with their shares of `parts`. The

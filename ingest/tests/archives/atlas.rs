@@ -95,13 +95,16 @@ impl Scene {
     }
 }
 
+/// Tiles by archive and key; none where the archive has none.
+type Tiles = BTreeMap<(usize, PageKey), Option<Arc<Tile>>>;
+
 /// Archives under a scene.
 pub struct Atlas {
     /// Which scene.
     pub scene: Scene,
     archives: Vec<Archive>,
     generator: Generator,
-    tiles: RefCell<BTreeMap<(usize, PageKey), Option<Arc<Tile>>>>,
+    tiles: RefCell<Tiles>,
     pages: RefCell<BTreeMap<PageKey, Arc<Page>>>,
 }
 
@@ -114,13 +117,7 @@ impl Atlas {
         let archives: Vec<_> = paths.iter().map(open).collect();
         let facts = archives.iter().map(|archive| archive.facts().clone()).collect();
         let generator = Generator::with_archives(&scene.settings(archives.len()), facts);
-        Self {
-            scene,
-            archives,
-            generator,
-            tiles: RefCell::default(),
-            pages: RefCell::default(),
-        }
+        Self { scene, archives, generator, tiles: RefCell::default(), pages: RefCell::default() }
     }
 
     /// Depth of the last level of the finest layer.

@@ -7,12 +7,12 @@
 
 use crate::atlas::{Atlas, EARTH, Scene, at, build, even, place_at, point_in, unit};
 use crate::rasters::{Sheet, VOID, options, rugged_m, world_m};
-use crate::tiff_file::Number;
 use crate::shared_data;
+use crate::tiff_file::Number;
 use overfly_core::datasource::facts::Datum;
 use overfly_core::datasource::{PAGE_SIDE, Page, PageKey};
 use overfly_core::geodesy::Geodetic;
-use overfly_core::ground::{LEVEL_BOUNDED, Place, Query, Region};
+use overfly_core::ground::{Ground, LEVEL_BOUNDED, Place, Query, Region};
 use overfly_core::lattice::unfold;
 use std::fmt::Write;
 use std::path::Path;
@@ -85,45 +85,42 @@ fn hunt_at(atlas: &Atlas, site: Geodetic, depth_max: u8, hunts: &mut [Hunt; 3]) 
         let mut ground = grounds[grounds.len() - 1].clone();
         ground.insert(atlas.page(place.page(depth)));
         grounds.push(ground);
-    }
-    for depth in 1..=depth_max {
         let key = place.page(depth);
-        for point in points(key, 7) {
-            let there = place_at(point);
-            let ground = &grounds[usize::from(depth)];
-            let Some(fine) = ground.height(there, Query::Exact(even(depth))).ok() else { continue };
-            for level in LEVEL_BOUNDED..even(depth) {
-                let coarse = ground.height(there, Query::Exact(level)).ok().unwrap();
-                let off_m = (coarse.height_m - fine.height_m).abs();
-                hunts[0].look(off_m, coarse.bound_m, || {
-                    format!("level {level} of {} at {there:?} {point} {fine:?}", even(depth))
-                });
-            }
-            for above in 0..depth {
-                let region = Region { centre: there, radius_m: 0.0 };
-                let range = grounds[usize::from(above)].min_max(region).ok().unwrap();
-                let off_m = (range.low_m - fine.height_m).max(fine.height_m - range.high_m);
-                hunts[1].look(off_m.max(0.0), 0.0, || {
-                    format!("depth {above}, {range:?} of {} at {there:?} {fine:?}", even(depth))
-                });
-            }
-        }
-        variation_within(&atlas.page(key), leaf_cells(atlas) as usize, &mut hunts[2]);
-        for above in 0..depth {
-            variation(atlas, key, place.page(above), &mut hunts[2]);
-        }
+        points(key, 7).for_each(|point| hunt_point(&grounds, place_at(point), hunts));
+        variation_within(&atlas.page(key), leaf_cells(atlas), &mut hunts[2]);
+        (0..depth).for_each(|above| variation(atlas, key, place.page(above), &mut hunts[2]));
+    }
+}
+
+/// The finest ground at a place against all coarser levels, and against the ranges that grounds
+/// of fewer pages give.
+fn hunt_point(grounds: &[Ground], there: Geodetic, [bounds, ranges, _]: &mut [Hunt; 3]) {
+    let (ground, coarser) = grounds.split_last().unwrap();
+    let finest = even(u8::try_from(coarser.len()).unwrap());
+    let Some(fine) = ground.height(there, Query::Exact(finest)).ok() else { return };
+    for level in LEVEL_BOUNDED..finest {
+        let coarse = ground.height(there, Query::Exact(level)).ok().unwrap();
+        let off_m = (coarse.height_m - fine.height_m).abs();
+        let story = || format!("level {level} at {there:?} {fine:?}");
+        bounds.look(off_m, coarse.bound_m, story);
+    }
+    for (depth, ground) in coarser.iter().enumerate() {
+        let range = ground.min_max(Region { centre: there, radius_m: 0.0 }).ok().unwrap();
+        let off_m = (range.low_m - fine.height_m).max(fine.height_m - range.high_m);
+        let story = || format!("depth {depth}, {range:?} at {there:?} {fine:?}");
+        ranges.look(off_m.max(0.0), 0.0, story);
     }
 }
 
 /// Cells that a leaf drawn from a page's samples has along a side: its descendants reach farther.
-fn leaf_cells(atlas: &Atlas) -> i32 {
+fn leaf_cells(atlas: &Atlas) -> usize {
     1 << (atlas.scene.patch_depth / 2).min(2)
 }
 
 /// Samples of a page, and of a fine one within it, against the variation that is stated there.
 fn variation(atlas: &Atlas, fine: PageKey, coarse: PageKey, hunt: &mut Hunt) {
     let (fine_page, coarse_page) = (atlas.page(fine), atlas.page(coarse));
-    let reach = leaf_cells(atlas);
+    let reach = i32::try_from(leaf_cells(atlas)).unwrap();
     for at in 0..16_u64 {
         let random = |i: u64| unit(fine.bits() ^ (at << 33 | i << 44 | 5));
         let [i, j] = [0, 1].map(|axis| (random(axis) * PAGE_SIDE as f64) as usize);
@@ -307,9 +304,8 @@ fn bounds_hold_with_a_geoid() {
     let path = folder.path().join("g.gtx");
     let node = |at: usize| if (at / 91) % 2 == at % 2 { 80.0 } else { -60.0 };
     std::fs::write(&path, crate::layers::gtx([-90.0, -180.0, 4.0, 4.0], [46, 91], node)).unwrap();
-    let input = RUGGED.write_whole(&folder.path().join("a.tif"), |lon, lat| {
-        rugged_m(lon, lat) - 900.0
-    });
+    let input =
+        RUGGED.write_whole(&folder.path().join("a.tif"), |lon, lat| rugged_m(lon, lat) - 900.0);
     let output = folder.path().join("a.pmtiles");
     let built = options(&[input], &output);
     build(&overfly_ingest::BuildOptions { datum: Datum::Egm96, geoid: Some(path), ..built })

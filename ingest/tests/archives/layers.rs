@@ -61,7 +61,7 @@ fn a_finer_inset_wins_inside_blends_evenly_and_ends() {
     let atlas = Atlas::open(&[&built.output], BARE);
     let low_m = ground(&atlas, at(-40.0, 100.0)).height_m;
     assert!((low_m - 100.0).abs() <= base.quantum_m / 2.0 + 0.3, "{low_m}");
-    // South of it, from well inside to beyond the blend: 0.2° wide.
+    // South of it, from well inside to beyond the blend: 0.2° wide, the first quarter still full.
     let (mut last_m, mut halves) = (1000.0, 0);
     for step in 0..=400 {
         let lat = 6.1 - 0.001 * f64::from(step);
@@ -72,7 +72,7 @@ fn a_finer_inset_wins_inside_blends_evenly_and_ends() {
             assert!((height_m - 1000.0).abs() < 1.0, "{lat}: {height_m}");
         } else if outside > 0.23 {
             assert!((height_m - low_m).abs() < 0.3, "{lat}: {height_m}");
-        } else if (0.099..0.101).contains(&outside) {
+        } else if (0.124..0.126).contains(&outside) {
             assert!((height_m - 0.5 * (1000.0 + low_m)).abs() < 15.0, "{lat}: {height_m}");
             halves += 1;
         }
@@ -88,8 +88,7 @@ fn a_finer_inset_wins_inside_blends_evenly_and_ends() {
     let hidden = hidden.count() as u64;
     let found = verify(&built);
     assert_eq!((found[0].hidden, found[0].compared), (hidden, 360 * 180 - hidden));
-    assert_eq!(found[1].hidden + found[1].compared, 161 * 161);
-    assert!(found[1].hidden <= 4 * 160, "{:?}", found[1]);
+    assert_eq!((found[1].hidden, found[1].compared), (0, 161 * 161));
 }
 
 #[test]
@@ -195,13 +194,18 @@ fn a_world_has_poles_whether_or_not_a_row_lies_on_them() {
     let on_pole = Sheet { first_deg: [-180.0, 90.0], step_deg: [2.0; 2], size: [180, 91] };
     for sheet in [Sheet::world(2.0), on_pole] {
         let slope_m = |_: f64, lat: f64| 3000.0 + 20.0 * lat;
-        let atlas =
-            opened(folder.path(), &options(&[sheet.write_whole(&path("w.tif"), slope_m)], &path("a")));
+        let atlas = opened(
+            folder.path(),
+            &options(&[sheet.write_whole(&path("w.tif"), slope_m)], &path("a")),
+        );
         let quantum_m = atlas.quantum_m(0);
         for (lat, wanted_m) in [(90.0, 4790.0), (-90.0, 1210.0), (45.0, 3900.0)] {
             for lon in [-180.0, -90.0, 0.0, 77.0, 180.0] {
                 let found = ground(&atlas, at(lat, lon));
-                assert!((found.height_m - wanted_m).abs() < 1.5 * quantum_m, "{lat} {lon} {found:?}");
+                assert!(
+                    (found.height_m - wanted_m).abs() < 1.5 * quantum_m,
+                    "{lat} {lon} {found:?}"
+                );
                 assert_eq!(found.origin, Origin::Measured);
             }
         }
@@ -218,9 +222,7 @@ fn a_raster_over_180_degrees_comes_back_on_both_sides() {
         let built = options(&[sheet.write_whole(&path("a.tif"), wavy)], &path("a.pmtiles"));
         opened(folder.path(), &built);
         let found = &verify(&built)[0];
-        // Beyond the outermost postings lies a point with less than full weight.
-        assert_eq!(found.compared + found.hidden, 101 * 101, "{first}");
-        assert!(found.hidden <= 4 * 100, "{found:?}");
+        assert_eq!((found.compared, found.hidden), (101 * 101, 0), "{first}");
         assert!(found.rms_m < 3.0, "{found:?}");
     }
 }
@@ -243,12 +245,11 @@ fn a_mercator_world_leaves_its_poles_to_what_lies_beneath() {
     build(&options(&[path("m.tif"), world], &path("both.pmtiles"))).unwrap();
     for (archive, polar_m) in [("m.pmtiles", 0.0), ("both.pmtiles", 500.0)] {
         let atlas = Atlas::open(&[&path(archive)], BARE);
-        for lon in [-180.0, -60.0, 0.0, 100.0, 180.0] {
-            for lat in [90.0_f64, -90.0, 0.0, 70.0, -80.0] {
-                let wanted_m = if lat.abs() == 90.0 { polar_m } else { 2000.0 };
-                let height_m = ground(&atlas, at(lat, lon)).height_m;
-                assert!((height_m - wanted_m).abs() < 60.0, "{archive} {lat} {lon}: {height_m}");
-            }
+        let wanted = [(90.0, polar_m), (-90.0, polar_m), (0.0, 2e3), (70.0, 2e3), (-80.0, 2e3)];
+        for (at, (lat, wanted_m)) in (0..25).map(|i| (i / 5, wanted[i % 5])) {
+            let lon = [-180.0, -60.0, 0.0, 100.0, 180.0][at];
+            let height_m = ground(&atlas, crate::atlas::at(lat, lon)).height_m;
+            assert!((height_m - wanted_m).abs() < 60.0, "{archive} {lat} {lon}: {height_m}");
         }
     }
 }
@@ -300,7 +301,7 @@ fn a_blend_may_be_as_narrow_as_nothing() {
     let sheet = Sheet::new([10.0, 46.25], 0.0025, [51, 51]);
     let input = sheet.write_whole(&path("a.tif"), |_, _| 300.0);
     for blend_m in [1.0, 0.0] {
-        let built = options(&[input.clone()], &path("a.pmtiles"));
+        let built = options(std::slice::from_ref(&input), &path("a.pmtiles"));
         let atlas = opened(folder.path(), &BuildOptions { blend_m: Some(blend_m), ..built });
         let found = ground(&atlas, at(46.2, 10.05));
         assert!((found.height_m - 300.0).abs() < 0.6, "blend {blend_m}: {found:?}");

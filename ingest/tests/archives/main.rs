@@ -15,7 +15,6 @@ mod bounds;
 mod layers;
 mod pages;
 mod rasters;
-mod probe;
 mod real;
 mod robust;
 mod seams;

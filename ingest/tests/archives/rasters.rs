@@ -89,7 +89,10 @@ pub fn rugged_m(lon_deg: f64, lat_deg: f64) -> f64 {
     };
     let cell = |deg: f64| ((deg + 400.0) * 3600.0).round() as u64;
     let rubble = (mix(cell(lon_deg) << 32 | cell(lat_deg)) >> 40) as f64 / f64::from(1 << 24);
-    950.0 + 900.0 * wave(1.7, 20.0) + 350.0 * wave(7.3, 70.0) + 120.0 * wave(31.0, 5.0)
+    950.0
+        + 900.0 * wave(1.7, 20.0)
+        + 350.0 * wave(7.3, 70.0)
+        + 120.0 * wave(31.0, 5.0)
         + 60.0 * rubble
 }
 
@@ -114,5 +117,6 @@ pub fn options(inputs: &[PathBuf], output: &Path) -> BuildOptions {
         geoid: None,
         blend_m: None,
         level_max: None,
+        density: None,
     }
 }

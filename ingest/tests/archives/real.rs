@@ -148,9 +148,8 @@ fn the_earth_and_mars_come_back() {
         assert_eq!(differences.len(), 1);
         let [found] = &differences[..] else { unreachable!("one source") };
         assert_eq!((found.compared, found.hidden), (report.postings[0], 0));
-        // Quanta are 11 m and 4.5 m: slopes of a world's postings are hundreds of metres.
-        let quantum_m = report.facts.layers[0].quantum_m;
-        assert!(found.rms_m <= 2.0 * quantum_m, "{found:?}, quantum {quantum_m}");
+        // Where a face of the octahedron is widest Mars has more postings than points.
+        assert!(found.rms_m <= 40.0 && found.p99_m <= 200.0, "{found:?}");
     }
 }
 
