@@ -344,15 +344,14 @@ impl Layer<'_> {
             }
             let lat = grid.lon_lat(0.0, row as f64)[1];
             let parallel = [cos(lat), sin(lat)];
-            for meridian in &meridians {
-                let place = j * window.width + meridian.column;
-                let hidden = || !alone && !self.shows(index, [meridian.lon_rad, lat]);
-                if window.void[place] || hidden() {
-                    continue;
-                }
+            let is_seen = |meridian: &&Meridian| {
+                let whole = !window.void[j * window.width + meridian.column];
+                whole && (alone || self.shows(index, [meridian.lon_rad, lat]))
+            };
+            for meridian in meridians.iter().filter(is_seen) {
+                let height_m = window.heights_m[j * window.width + meridian.column];
                 let normal = meridian.normal(parallel);
-                let height_m = f64::from(window.heights_m[place]);
-                self.put(square, normal, height_m, &mut block.postings);
+                self.put(square, normal, f64::from(height_m), &mut block.postings);
             }
         }
     }

@@ -150,6 +150,7 @@ fn tile(key: PageKey) -> Tile {
                 variation: bound_of(26.0),
                 slope: bound_of(1.0),
                 roughness: 4,
+                roughest: 4,
                 edge: true,
                 range: [-2, 2],
             }; MARK_SIDE * MARK_SIDE],
