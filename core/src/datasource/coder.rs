@@ -122,10 +122,21 @@ impl Encoder {
         }
     }
 
-    /// Ends the stream.
+    /// Ends the stream: any number of the last range will do, so one that ends in zeros is taken,
+    /// which need not be written.
     pub fn finish(mut self) -> Vec<u8> {
+        let end = self.low + u64::from(self.range);
+        let rounded = |bits: u32| (self.low + (1 << bits) - 1) >> bits << bits;
+        if let Some(low) = [24, 16, 8].map(rounded).into_iter().find(|&low| low < end) {
+            self.low = low;
+        }
         for _ in 0..5 {
             self.shift();
+        }
+        for _ in 0..4 {
+            if self.bytes.last() == Some(&0) {
+                self.bytes.pop();
+            }
         }
         self.bytes
     }

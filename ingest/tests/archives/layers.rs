@@ -106,7 +106,7 @@ fn of_two_insets_of_one_spacing_the_first_is_seen_and_the_other_goes_on() {
         let lon = 10.1 + 0.01 * f64::from(step);
         let height_m = ground(&atlas, at(9.5, lon)).height_m;
         assert!(height_m >= last_m - 0.5, "{lon}: {height_m} after {last_m}");
-        // The west one is seen up to 8 postings from its end.
+        // The west one is seen up to the blend from its end.
         let wanted = [(10.0, 10.9, 200.0), (11.01, 12.0, 800.0)];
         for (from, to, wanted_m) in wanted {
             let is_there = lon > from && lon < to;
