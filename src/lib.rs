@@ -278,13 +278,12 @@ impl Overfly {
 
     /// Exact height of the ground above the ellipsoid at a place, in metres, beneath water too: a
     /// pure function of the scene and the place, whatever is loaded. Where an archive has data it
-    /// is the surface of the data's level, else the procedural planet itself.
+    /// is that with its detail, else the procedural planet itself.
     ///
     /// # Errors
     /// The archive has data there, and it cannot be read.
     pub fn ground_height_m(&self, at: Geodetic) -> Result<f64, SourceError> {
-        // Above data the surveyor makes a page or two; a scene without archives never asks it.
-        ground_height_m(&mut Surveyor::beneath_water(self.sources.clone(), 0), at)
+        ground_height_m(&self.sources, at)
     }
 
     /// A bundled flight over this scene's body and ground: `rainier`, `descent` or `poles`. Where
@@ -298,7 +297,7 @@ impl Overfly {
         let (surveyor, failed) = (RefCell::new(surveyor), RefCell::new(None));
         let height_m = |at| {
             let mut surveyor = surveyor.borrow_mut();
-            let error = match ground_height_m(&mut surveyor, at) {
+            let error = match ground_height_m(&self.sources, at) {
                 Ok(height_m) => return height_m,
                 Err(error) => error,
             };
@@ -331,11 +330,11 @@ impl Drop for Overfly {
     }
 }
 
-fn ground_height_m(surveyor: &mut Surveyor, at: Geodetic) -> Result<f64, SourceError> {
-    let sources = surveyor.sources().clone();
+fn ground_height_m(sources: &Sources, at: Geodetic) -> Result<f64, SourceError> {
     let place = crate::core::ground::Place::of(at.normal());
-    let planet = || sources.generator().planet().map_or(0.0, |it| it.sample(at.normal()).height_m);
-    let Some(level) = sources.data_level(place)? else { return Ok(planet()) };
-    let answer = surveyor.height(at, Query::Exact(level))?;
-    Ok(answer.found().map_or_else(planet, |height| height.height_m))
+    if sources.data_level(place)?.is_some() {
+        return sources.ground_m(at);
+    }
+    let planet = sources.generator().planet();
+    Ok(planet.map_or(0.0, |planet| planet.sample(at.normal()).height_m))
 }

@@ -7,15 +7,17 @@
 
 use crate::archive::{Archive, ArchiveError, Location, OpenOptions};
 use crate::core::datasource::codec::{TileFault, decode};
-use crate::core::datasource::compose::Need;
+use crate::core::datasource::compose::{Need, cell_of};
 use crate::core::datasource::generate::Generator;
-use crate::core::datasource::key::PAGE_BITS;
+use crate::core::datasource::key::{DEPTH_MAX, PAGE_BITS};
 use crate::core::datasource::page::SAMPLES;
 use crate::core::datasource::tile::{FULL, LayerTile, Tile};
 use crate::core::datasource::{Page, PageKey};
-use crate::core::geodesy::Ellipsoid;
+use crate::core::geodesy::{Ellipsoid, Geodetic};
 use crate::core::ground::{Place, Query};
+use crate::core::lattice::RADIUS;
 use crate::core::settings::SceneSettings;
+use glam::IVec3;
 use lru::LruCache;
 use parking_lot::Mutex;
 use std::fmt;
@@ -172,6 +174,28 @@ impl Sources {
         let needs = self.generator.needs(key);
         let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
         Ok(self.generator.page_from(key, &tiles.collect::<Result<Vec<_>, _>>()?))
+    }
+
+    /// Height of the ground itself above the ellipsoid, at the lattice point next to a place.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn ground_m(&self, at: Geodetic) -> Result<f64, SourceError> {
+        let normal = at.normal();
+        let whole = f64::from(RADIUS);
+        let [x, y, z] = normal.to_array();
+        let scale = whole / (x.abs() + y.abs() + z.abs());
+        // Even coordinates, as all vertices have; the third follows from the other two.
+        #[expect(clippy::cast_possible_truncation, reason = "within the octahedron")]
+        let even = |part: f64| (part * scale / 2.0).round() as i32 * 2;
+        let (x, y) = (even(x), even(y));
+        let rest = (RADIUS - x.abs() - y.abs()).max(0);
+        let x = if x.abs() + y.abs() > RADIUS { x.signum() * (RADIUS - y.abs()) } else { x };
+        let point = IVec3::new(x, y, if z < 0.0 { -rest } else { rest });
+        let key = cell_of(point, DEPTH_MAX);
+        let needs = self.generator.needs(key);
+        let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
+        Ok(self.generator.ground_m(key, point, &tiles.collect::<Result<Vec<_>, _>>()?))
     }
 
     /// Level of the finest data that is seen at a place; `None` where no archive has any.

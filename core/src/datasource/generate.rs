@@ -125,6 +125,15 @@ impl Generator {
         Arc::from(page)
     }
 
+    /// Height of the ground itself above the ellipsoid at a lattice point of the page `key`, below
+    /// water too, detail and all; `tiles` are what [`Self::needs`] asked for.
+    pub fn ground_m(&self, key: PageKey, point: IVec3, tiles: &[Option<Arc<Tile>>]) -> f64 {
+        let needs = self.needs(key);
+        assert_eq!(needs.len(), tiles.len(), "a tile, or none, for every need");
+        let ground = Plots::new(&self.bed, &needs, tiles).ground(point);
+        ground.height_m + ground.sea_level_m
+    }
+
     /// Marks hold for patches of depth 4; deeper ones reach farther, as from coarser tiles.
     fn coarser(&self) -> u8 {
         self.patch_depth.saturating_sub(4) / 2
