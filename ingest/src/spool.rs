@@ -5,7 +5,7 @@
 //! Keeps: an unnamed file, which vanishes with the process; where each record lies.
 //! Not here: what records mean (`pyramid`).
 
-use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
+use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut, cast_slice_mut};
 use overfly_core::datasource::PageKey;
 use overfly_core::datasource::page::SAMPLES;
 use overfly_core::datasource::tile::MARK_SIDE;
@@ -137,8 +137,3 @@ impl Spool {
 }
 
 const _: () = assert!(size_of::<Record>() < 28_000, "a tile takes no more of the disk");
-
-/// The bytes of statistics, for sums that tell two spools apart.
-pub fn bytes_of_stats(stats: &[[Stat; BLOCKS]; BLOCKS]) -> &[u8] {
-    cast_slice(stats.as_slice())
-}

@@ -188,7 +188,7 @@ fn mark_depth(key: PageKey, layer: &LayerFacts, coarser: u8) -> u8 {
 }
 
 /// Whether a lattice point lies in a cell, its border included.
-fn holds(key: PageKey, point: IVec3) -> bool {
+pub fn holds(key: PageKey, point: IVec3) -> bool {
     let (sx, sy) = signs(key.quadrant());
     if sx * point.x < 0 || sy * point.y < 0 {
         return false;

@@ -5,7 +5,7 @@
 //! Keeps: nothing but the immutable ground.
 //! Not here: heights (`compose`, `procedural`), fetching tiles (the host's loader).
 
-use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m};
+use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, holds};
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
 use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
@@ -14,7 +14,7 @@ use super::procedural::{Planet, Style};
 use super::tile::Tile;
 use crate::digest::Chain;
 use crate::geodesy::{Ellipsoid, narrow};
-use crate::lattice::{cross_of, normal_of, signs, unfold};
+use crate::lattice::{cross_of, normal_of, unfold};
 use crate::lod::reach::{DIAGONAL, EXTENT_EVEN, NORM_MIN, edges};
 use crate::settings::SceneSettings;
 use glam::{DVec3, IVec3};
@@ -265,15 +265,12 @@ fn places() -> impl Iterator<Item = (usize, usize)> {
 
 /// Index of the sample at a lattice point, if it is one of the page `key`.
 fn place_within(key: PageKey, point: IVec3) -> Option<usize> {
-    let (sx, sy) = signs(key.quadrant());
-    if sx * point.x < 0 || sy * point.y < 0 {
-        return None;
-    }
-    let (u, v) = unfold(key.quadrant(), point);
-    let (u0, v0) = key.origin();
-    let inside = |along: i32| (0..=key.side()).contains(&along);
-    let place = |along: i32| usize::try_from(along / key.step()).expect("inside the page");
-    (inside(u - u0) && inside(v - v0)).then(|| place(v - v0) * PAGE_SIDE + place(u - u0))
+    holds(key, point).then(|| {
+        let (u, v) = unfold(key.quadrant(), point);
+        let (u0, v0) = key.origin();
+        let place = |along: i32| usize::try_from(along / key.step()).expect("inside the page");
+        place(v - v0) * PAGE_SIDE + place(u - u0)
+    })
 }
 
 /// Rock, with what steepness bares of it; `flat` is the cosine of the slope.
