@@ -11,8 +11,8 @@ use crate::node::{Kind, Node};
 use overfly_core::datasource::procedural::Style;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::settings::{
-    DepthSettings, LensSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings,
-    SunSettings, is_address,
+    DepthFormat, DepthOrder, DepthSettings, LensSettings, LodSettings, MemorySettings,
+    SceneSettings, SourceSettings, SunSettings, VertexPrecision, is_address,
 };
 use overfly_core::units::{Pixels, Radians};
 
@@ -86,6 +86,8 @@ pub(crate) fn scene<'t>(reader: &mut Reader<'t>, root: &'t Node) -> Option<Scene
         lod: lod?,
         views: views.into_iter().map(|view| view.lens).collect::<Option<_>>()?,
         depth: depth?,
+        vertices: VertexPrecision::TwoFloat,
+        imagery: Vec::new(),
         memory: memory?,
         sea: sea?,
         sun: sun?,
@@ -283,6 +285,7 @@ fn lod<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<LodSettings> {
         merges_max: merges_max?,
         level_max: level_max?,
         wanted_max: wanted_max?,
+        morph_s: 0.0,
     })
 }
 
@@ -406,7 +409,8 @@ fn depth<'t>(reader: &mut Reader<'t>, scene: &Group<'t>, views: &[View]) -> Opti
     if let Some(Some(first_m)) = splits_m.first() {
         splits_beyond_near(reader, &depth, views, *first_m);
     }
-    Some(DepthSettings { splits_m: splits_m.into_iter().collect::<Option<_>>()? })
+    let splits_m = splits_m.into_iter().collect::<Option<_>>()?;
+    Some(DepthSettings { format: DepthFormat::D32F, order: DepthOrder::Reversed, splits_m })
 }
 
 fn splits_m(reader: &mut Reader, nodes: &[Node]) -> Vec<Option<f64>> {

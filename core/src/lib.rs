@@ -41,4 +41,6 @@ pub mod ground;
 
 pub mod frame;
 
+pub mod inspect;
+
 pub mod digest;

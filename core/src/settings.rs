@@ -24,6 +24,10 @@ pub struct SceneSettings {
     pub views: Vec<LensSettings>,
     /// Depth ranges of the renderer.
     pub depth: DepthSettings,
+    /// How a renderer gets from a vertex to its place before the eye.
+    pub vertices: VertexPrecision,
+    /// Archives of imagery that drape over the ground, the finest first.
+    pub imagery: Vec<String>,
     /// Memory limits.
     pub memory: MemorySettings,
     /// Water covers the ground below height 0.
@@ -72,6 +76,9 @@ pub struct LodSettings {
     pub level_max: u8,
     /// Longest list of wanted pages in one frame.
     pub wanted_max: u32,
+    /// How long a new vertex takes from the surface that it refines to its own place, in seconds
+    /// of the flight; 0 is at once.
+    pub morph_s: f64,
 }
 
 /// One view of the scene, relative to the pose of a flight.
@@ -89,9 +96,42 @@ pub struct LensSettings {
     pub near_m: f64,
 }
 
+/// Numbers in a depth buffer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DepthFormat {
+    /// 32 bits of float.
+    D32F,
+    /// 24 bits of fixed point.
+    D24,
+}
+
+/// Which way depth runs.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DepthOrder {
+    /// 1 near, 0 far: what floats resolve best.
+    Reversed,
+    /// 0 near, 1 far.
+    Forward,
+}
+
+/// How a renderer gets from a vertex to its place before the eye. Both give one f32 triple a
+/// lattice key, whatever patch draws it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum VertexPrecision {
+    /// The shader subtracts two-float pairs: no work in a frame; good for fields of view down to
+    /// about 1°.
+    TwoFloat,
+    /// The host subtracts and rotates in f64 in every frame: good for any field of view.
+    EyeF64,
+}
+
 /// How the renderer cuts the view in depth.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DepthSettings {
+    /// Numbers in the depth buffer.
+    pub format: DepthFormat,
+    /// Which way they run.
+    pub order: DepthOrder,
     /// Borders between the ranges in metres, rising; n borders make n + 1 ranges.
     pub splits_m: Vec<f64>,
 }
@@ -187,6 +227,7 @@ impl SceneSettings {
             ("merges_max", lod.merges_max.to_string()),
             ("level_max", lod.level_max.to_string()),
             ("wanted_max", lod.wanted_max.to_string()),
+            ("morph_s", format!("{:?}", lod.morph_s)),
         ] {
             list.push((format!("lod.{name}"), value));
         }
@@ -237,9 +278,16 @@ mod tests {
                 merges_max: 1,
                 level_max: 40,
                 wanted_max: 1,
+                morph_s: 0.0,
             },
             views: Vec::new(),
-            depth: DepthSettings { splits_m: Vec::new() },
+            depth: DepthSettings {
+                format: DepthFormat::D32F,
+                order: DepthOrder::Reversed,
+                splits_m: Vec::new(),
+            },
+            vertices: VertexPrecision::TwoFloat,
+            imagery: Vec::new(),
             memory: MemorySettings { pages_bytes: 1 << 20 },
             sea: false,
             sun: None,

@@ -12,7 +12,8 @@ use overfly_core::datasource::procedural::Style;
 use overfly_core::digest::FrameDigest;
 use overfly_core::geodesy::{Ecef, Ellipsoid, Geodetic};
 use overfly_core::settings::{
-    DepthSettings, LensSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings,
+    DepthFormat, DepthOrder, DepthSettings, LensSettings, LodSettings, MemorySettings,
+    SceneSettings, SourceSettings, VertexPrecision,
 };
 use overfly_core::units::{Pixels, Radians};
 use overfly_replay::{
@@ -44,6 +45,7 @@ fn scene() -> SceneSettings {
             merges_max: 100,
             level_max: 40,
             wanted_max: 64,
+            morph_s: 0.0,
         },
         views: vec![LensSettings {
             name: "front".into(),
@@ -52,7 +54,13 @@ fn scene() -> SceneSettings {
             pitch: Radians(0.0),
             near_m: 0.1,
         }],
-        depth: DepthSettings { splits_m: vec![1000.0] },
+        depth: DepthSettings {
+            format: DepthFormat::D32F,
+            order: DepthOrder::Reversed,
+            splits_m: vec![1000.0],
+        },
+        vertices: VertexPrecision::TwoFloat,
+        imagery: Vec::new(),
         memory: MemorySettings { pages_bytes: 1 << 28 },
         sea: true,
         sun: None,

@@ -19,6 +19,8 @@ pub struct FrameInput {
     pub views: Vec<View>,
     /// Pages that arrived since the last frame, in this order. The frame takes them out.
     pub arrived: Vec<Arc<Page>>,
+    /// The mesh stays as it is, and no page is asked for: only the draws follow the views.
+    pub hold_lod: bool,
 }
 
 /// What one frame ended in.
@@ -26,6 +28,8 @@ pub struct FrameInput {
 pub struct FrameOutput {
     /// Frames run before this one.
     pub frame: u64,
+    /// The input's time in whole milliseconds, modulo 2^32: what morphing vertices count from.
+    pub time_ms: u32,
     /// Counts of the work done.
     pub counts: FrameCounts,
     /// Pages that the LOD lacks, the most urgent first; give them in a later frame's `arrived`.
@@ -38,6 +42,17 @@ pub struct FrameOutput {
     pub views: Vec<ViewDraws>,
     /// What the state is now.
     pub digest: FrameDigest,
+    /// Device memory of whoever draws; zero where nobody does.
+    pub device: DeviceTotals,
+}
+
+/// Device memory of a renderer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct DeviceTotals {
+    /// Buffers and images.
+    pub allocations: u32,
+    /// Bytes of all of them.
+    pub bytes: u64,
 }
 
 /// The draws of one view.

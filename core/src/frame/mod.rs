@@ -193,6 +193,7 @@ fn admit(terrain: &Terrain) {
     // The list of arrived pages is taken out of the input, so that `see` may read the views.
     let mut arrived = core::mem::take(&mut terrain.input.lock().arrived);
     output.evicted.clear();
+    output.time_ms = milliseconds(terrain.input.lock().time_s);
     let frame = output.frame;
     let done = pages.admit(&mut arrived, frame, &mut output.evicted);
     terrain.input.lock().arrived = arrived;
@@ -204,6 +205,13 @@ fn admit(terrain: &Terrain) {
         ..FrameCounts::default()
     };
     output.digest.pages = pages.digest();
+}
+
+/// A time in whole milliseconds, modulo 2^32; 0 where it is not finite.
+fn milliseconds(time_s: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "the remainder is below 2^32")]
+    let ms = (time_s * 1e3).floor().rem_euclid(4_294_967_296.0) as u32;
+    ms
 }
 
 fn knobs_of(settings: &SceneSettings, limits: &Limits) -> Knobs {

@@ -12,4 +12,4 @@ pub mod patches;
 pub mod place;
 pub mod topology;
 
-pub use patches::{PatchVertex, Patches};
+pub use patches::{PatchMorph, PatchVertex, Patches};

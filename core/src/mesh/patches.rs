@@ -36,6 +36,26 @@ impl PatchVertex {
     };
 }
 
+/// Where a vertex of a morphing scene begins: 24 bytes beside its [`PatchVertex`].
+///
+/// At time t it is drawn at its own place plus `from_m` times what is left of its way, which is
+/// 1 when it is born and 0 from `morph_s` later on; normals and layers are mixed the same way. All
+/// is a function of the lattice point, so that neighbouring patches agree at every moment.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(C)]
+pub struct PatchMorph {
+    /// From the vertex's own place to where it begins, body-fixed axes, metres.
+    pub from_m: [f32; 3],
+    /// Normal there, encoded as in [`PatchVertex`].
+    pub normal_oct: [i16; 2],
+    /// Hidden layers there.
+    pub layers: [u8; 4],
+    /// Time of the flight at which it was born, in milliseconds modulo 2^32.
+    pub born_ms: u32,
+}
+
+const _: () = assert!(size_of::<PatchMorph>() == 24);
+
 /// Which leaf triangle a slot shows: diamond record and side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Leaf {
@@ -56,6 +76,8 @@ pub struct Patches {
     pub leaf: Vec<Option<Leaf>>,
     /// Vertices of slot s: `s * vertices_per_patch ..` and as many on.
     pub vertices: Vec<PatchVertex>,
+    /// Where these vertices begin, in the same places; empty where the scene does not morph.
+    pub morphs: Vec<PatchMorph>,
     /// Bounding spheres, by group.
     pub bounds: Vec<Bounds>,
     /// How often a slot of each group was filled or given back, for who keeps what follows from it.
@@ -92,6 +114,7 @@ impl Patches {
             vertices_per_patch,
             leaf: vec![None; slots],
             vertices: vec![PatchVertex::EMPTY; slots * vertices_per_patch as usize],
+            morphs: Vec::new(),
             bounds: vec![Bounds::EMPTY; slots.div_ceil(GROUP)],
             stamps: vec![0; slots.div_ceil(GROUP)],
             content: vec![0; slots],

@@ -18,7 +18,8 @@ use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::ground::{Ground, Place};
 use overfly_core::lattice::{fold, normal_of};
 use overfly_core::settings::{
-    DepthSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings,
+    DepthFormat, DepthOrder, DepthSettings, LodSettings, MemorySettings, SceneSettings,
+    SourceSettings, VertexPrecision,
 };
 use overfly_core::units::Pixels;
 use overfly_ingest::{BuildOptions, Difference, IngestError, Report};
@@ -85,9 +86,16 @@ impl Scene {
                 merges_max: 400,
                 level_max: 48,
                 wanted_max: 64,
+                morph_s: 0.0,
             },
             views: vec![],
-            depth: DepthSettings { splits_m: vec![30.0, 1e4] },
+            depth: DepthSettings {
+                format: DepthFormat::D32F,
+                order: DepthOrder::Reversed,
+                splits_m: vec![30.0, 1e4],
+            },
+            vertices: VertexPrecision::TwoFloat,
+            imagery: Vec::new(),
             memory: MemorySettings { pages_bytes: 64 << 20 },
             sea: self.sea,
             sun: None,

@@ -9,6 +9,7 @@ use super::*;
 use crate::camera::View;
 use crate::geodesy::{Ecef, Ellipsoid};
 use crate::mesh::patches::{BuiltPatch, Leaf};
+use crate::settings::{DepthFormat, DepthOrder};
 use crate::units::Radians;
 use glam::{DQuat, DVec3};
 
@@ -100,7 +101,11 @@ fn draws_are_those_of_testing_every_slot_in_every_frame() {
         fill(&mut patches, slot, slot.into());
         spheres[slot as usize] = Some(sphere(slot.into()));
     }
-    let depth = DepthSettings { splits_m: vec![30.0, 1e4] };
+    let depth = DepthSettings {
+        format: DepthFormat::D32F,
+        order: DepthOrder::Reversed,
+        splits_m: vec![30.0, 1e4],
+    };
     let (mut eye, mut turn) = (ground(), DQuat::IDENTITY);
     let mut view = empty_draws(camera(eye, turn), &depth, SLOTS);
     let mut placed = Placed::new(SLOTS);
@@ -152,7 +157,8 @@ fn another_set_of_ranges_begins_anew() {
     let eye = sphere(0).0 + DVec3::Z * 100.0;
     let mut placed = Placed::new(64);
     for (splits_m, expected) in [(vec![50.0], [0, 1]), (vec![5000.0], [1, 0])] {
-        let depth = DepthSettings { splits_m };
+        let depth =
+            DepthSettings { format: DepthFormat::D32F, order: DepthOrder::Reversed, splits_m };
         let mut view = empty_draws(camera(eye, DQuat::IDENTITY), &depth, 64);
         let (aim, blocks) = placed.begin(&view, &patches);
         place_blocks(&patches, &aim, 0, blocks);
@@ -164,7 +170,11 @@ fn another_set_of_ranges_begins_anew() {
 
 #[test]
 fn ranges_cover_all_depths_and_overlap_slightly() {
-    let depth = DepthSettings { splits_m: vec![30.0, 1e4] };
+    let depth = DepthSettings {
+        format: DepthFormat::D32F,
+        order: DepthOrder::Reversed,
+        splits_m: vec![30.0, 1e4],
+    };
     let ranges: Vec<_> = ranges_of(0.1, &depth).collect();
     assert_eq!(ranges.len(), 3);
     assert_eq!(ranges[0].0, 0.1);
