@@ -13,9 +13,21 @@ use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use std::{env, fs, path::PathBuf};
 
-const PROGRAMS: [(&str, &[&str]); 3] = [
-    ("terrain", &["air", "two_float", "grain", "terrain"]),
-    ("sky", &["air", "sky"]),
+/// Vertex programs of the ground: how vertices are placed × whether they move × for whom.
+const PLACES: [(&str, &[&str]); 2] =
+    [("two_float", &["two_float", "place_two_float"]), ("eye", &["place_eye"])];
+const ENTRIES: [(&str, &[&str]); 4] = [
+    ("", &["point", "vertex"]),
+    ("_morph", &["point", "morph", "vertex_morph"]),
+    ("_debug", &["point_debug", "patch", "vertex_debug"]),
+    ("_morph_debug", &["point_debug", "patch", "morph", "vertex_morph_debug"]),
+];
+
+const PROGRAMS: [(&str, &[&str]); 5] = [
+    ("terrain", &["view", "air", "grain", "point", "terrain"]),
+    ("debug", &["view", "point_debug", "debug"]),
+    ("sky", &["view", "air", "sky"]),
+    ("overlay", &["view", "overlay"]),
     ("self_test", &["two_float", "self_test"]),
 ];
 
@@ -24,7 +36,15 @@ fn main() {
     println!("cargo::rerun-if-changed=spirv_pass.rs");
     println!("cargo::rerun-if-changed=build.rs");
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    for (program, files) in PROGRAMS {
+    let mut programs: Vec<(String, Vec<&str>)> =
+        PROGRAMS.iter().map(|(program, files)| ((*program).to_owned(), files.to_vec())).collect();
+    for (place, first) in PLACES {
+        for (entry, last) in ENTRIES {
+            let files = [&["view", "clip"], first, last].concat();
+            programs.push((format!("ground_{place}{entry}"), files));
+        }
+    }
+    for (program, files) in &programs {
         let words = spirv_pass::without_contraction(&compile(program, files));
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let path = out.join(program).with_extension("spv");

@@ -32,13 +32,15 @@ struct Readme;
 
 use crate::archive::OpenOptions;
 use crate::core::datasource::PageKey;
+use crate::core::frame::data::ViewDraws;
 use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
 use crate::core::geodesy::Geodetic;
 use crate::core::ground::{Ground, Query, Readiness, Region, RegionFault};
+use crate::core::inspect::PatchInfo;
 use crate::core::scene::{FrameParts, extract, world_of};
 use crate::core::settings::SceneSettings;
 use crate::jobs::{Graph, Span, Spans, Team, Workers};
-use crate::render_vk::{DrawError, DrawReport, Renderer};
+use crate::render_vk::{Backdrop, DrawError, DrawReport, Overlay, Picture, Renderer, Show};
 use crate::replay::Flight;
 use loader::Loader;
 use parking_lot::Mutex;
@@ -61,13 +63,54 @@ struct House {
     drawing: Mutex<Drawing>,
 }
 
+/// What pictures show from now on, besides the scene.
+#[derive(Default)]
+pub struct Looks {
+    /// What the ground is coloured by.
+    pub show: Show,
+    /// Drawn over everything.
+    pub overlay: Overlay,
+    /// What is behind the ground.
+    pub backdrop: Backdrop,
+}
+
 #[derive(Default)]
 struct Drawing {
     renderer: Option<Renderer>,
     parts: FrameParts,
+    looks: Looks,
+    infos: Vec<PatchInfo>,
     /// View to draw in this frame, if any.
     view: Option<usize>,
     report: Option<Result<DrawReport, DrawError>>,
+}
+
+impl Drawing {
+    /// Draws a view of a terrain, if there is a renderer.
+    fn draw(
+        &mut self,
+        terrain: &Terrain,
+        (view, time_ms): (&ViewDraws, u32),
+        team: &Team<'_>,
+    ) -> Option<Result<DrawReport, DrawError>> {
+        let Self { renderer, parts, looks, infos, .. } = self;
+        let renderer = renderer.as_mut()?;
+        infos.clear();
+        if looks.show.needs_infos() {
+            let _ = &terrain;
+        }
+        let picture = Picture {
+            view,
+            patches: &terrain.patches(),
+            parts,
+            time_ms,
+            show: looks.show,
+            infos,
+            overlay: &looks.overlay,
+            backdrop: looks.backdrop,
+        };
+        Some(renderer.draw(&picture, team))
+    }
 }
 
 /// A scene with everything that it needs to run.
@@ -106,13 +149,14 @@ impl Overfly {
         let placed = add_stages(&mut graph, |house: &House| &house.terrain);
         graph.stage(RECORD, &[placed], |house: &House, team| {
             let mut drawing = house.drawing.lock();
-            let output = house.terrain.output().lock();
-            let Drawing { renderer, parts, view, report } = &mut *drawing;
-            let Some(renderer) = renderer else { return };
+            let mut output = house.terrain.output().lock();
+            let Some(renderer) = &mut drawing.renderer else { return };
             renderer.note_built(&output.built);
-            if let Some(view) = view.and_then(|index| output.views.get(index)) {
-                *report = Some(renderer.draw(view, &house.terrain.patches(), parts, team));
+            if let Some(view) = drawing.view.and_then(|index| output.views.get(index)) {
+                drawing.report = drawing.draw(&house.terrain, (view, output.time_ms), team);
             }
+            let totals = drawing.renderer.as_ref().map(Renderer::device_totals);
+            output.device = totals.unwrap_or_default();
         });
         let pages_max = terrain.limits().pages;
         Ok(Self {
@@ -163,9 +207,10 @@ impl Overfly {
         view: Option<usize>,
     ) -> Result<Option<DrawReport>, FrameError> {
         self.ground.note(input.arrived.iter().map(|page| page.key));
+        let time_s = input.time_s;
         self.house.terrain.begin(input).map_err(FrameError::View)?;
         let drawing = self.house.drawing.get_mut();
-        (drawing.view, drawing.parts) = (view, extract(&self.world));
+        (drawing.view, drawing.parts) = (view, extract(&self.world, time_s));
         let ran = self.graph.run(&self.house, &self.workers);
         self.house.terrain.finish(output);
         self.ground.note(output.evicted.iter().map(|page| page.key));
@@ -184,11 +229,14 @@ impl Overfly {
         output: &FrameOutput,
         view: usize,
     ) -> Result<Option<DrawReport>, DrawError> {
-        let Drawing { renderer, parts, .. } = self.house.drawing.get_mut();
-        let (Some(renderer), Some(view)) = (renderer, output.views.get(view)) else {
-            return Ok(None);
-        };
-        renderer.draw(view, &self.house.terrain.patches(), parts, &Team::alone()).map(Some)
+        let Some(view) = output.views.get(view) else { return Ok(None) };
+        let House { terrain, drawing } = &mut self.house;
+        drawing.get_mut().draw(terrain, (view, output.time_ms), &Team::alone()).transpose()
+    }
+
+    /// What pictures show from now on; change it between frames.
+    pub fn looks_mut(&mut self) -> &mut Looks {
+        &mut self.house.drawing.get_mut().looks
     }
 
     /// Lends the renderer, to read pictures and messages.

@@ -12,8 +12,9 @@ use glam::DVec3;
 use overfly_core::camera::Camera;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::scene::FrameParts;
+use overfly_core::settings::{DepthFormat, DepthOrder, VertexPrecision};
 use overfly_jobs::{Team, now_ns};
-use overfly_render_vk::{Renderer, RendererSettings};
+use overfly_render_vk::{Picture, Renderer, RendererSettings};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -27,17 +28,23 @@ fn main() -> Result<(), Box<dyn Error>> {
         patches_max: patches.used_end(),
         size_px: SIZE_PX,
         ranges_max: 3,
+        depth_format: DepthFormat::D32F,
+        depth_order: DepthOrder::Reversed,
+        vertices: VertexPrecision::TwoFloat,
+        morph_s: 0.0,
+        tolerance_px: 1.0,
+        keep_depth: false,
         frames_in_flight: 2,
         validation: false,
     })?;
     println!("{}", renderer.device_line());
     for (name, camera, parts) in scenes() {
         let draws = planet::draws(camera, &patches, &[1.0]);
-        let mut report = renderer.draw(&draws, &patches, &parts, &Team::alone())?;
+        let mut report = renderer.draw(&Picture::of(&draws, &patches, &parts), &Team::alone())?;
         renderer.wait()?;
         let begin_ns = now_ns();
         for _ in 0..5 {
-            report = renderer.draw(&draws, &patches, &parts, &Team::alone())?;
+            report = renderer.draw(&Picture::of(&draws, &patches, &parts), &Team::alone())?;
         }
         renderer.wait()?;
         println!("{name}: {} µs, {report:?}", (now_ns() - begin_ns) / 5000);

@@ -1,27 +1,4 @@
-// What every pass knows: the view, the light, the air, and every constant of the shading.
-
-// ---- The view: one block of push constants, 124 bytes; `ViewTerms` in src/matrices.rs. ----
-struct View {
-    eye_hi: vec3<f32>,        // body-fixed eye, metres, as a two-float
-    air: f32,                 // 1 with an atmosphere, else 0
-    eye_lo: vec3<f32>,
-    sea: f32,                 // 1 where ground below height 0 is water, else 0
-    right: vec3<f32>,         // unit vectors of the picture, body-fixed axes
-    inverse_tan_x: f32,       // 1 / tangent of half the field of view
-    up: vec3<f32>,
-    inverse_tan_y: f32,
-    forward: vec3<f32>,
-    body_radius_m: f32,       // |eye| - height: radius of the body under the eye
-    eye_up: vec3<f32>,        // geodetic normal under the eye
-    eye_height_m: f32,
-    sun: vec3<f32>,           // towards the light
-    sun_on: f32,              // 1 with a sun; 0: lit evenly from above the eye
-    depth_slope: f32,         // clip z = slope * w + offset, reversed: 1 near, 0 far
-    depth_offset: f32,
-    pixel_rad: f32,           // angle of a pixel in the middle of the picture
-}
-
-var<immediate> view: View;
+// The light and the air, and every constant of them.
 
 // ---- Light ----
 const SUN_LIGHT: vec3<f32> = vec3<f32>(20.0, 19.4, 18.4); // irradiance before the air, arbitrary

@@ -8,7 +8,7 @@ struct SkyVertex {
 fn vertex(@builtin(vertex_index) index: u32) -> SkyVertex {
     let corner = vec2<f32>(f32(index & 1u), f32(index >> 1u)) * 4.0 - 1.0;
     var out: SkyVertex;
-    out.position = vec4<f32>(corner.x, -corner.y, 0.0, 1.0);
+    out.position = vec4<f32>(corner.x, -corner.y, range.far, 1.0);
     out.ray = view.forward
         + view.right * (corner.x / view.inverse_tan_x)
         + view.up * (corner.y / view.inverse_tan_y);

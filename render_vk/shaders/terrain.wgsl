@@ -1,4 +1,4 @@
-// The ground: patches of two-float vertices, coloured by height, slope and hidden layers.
+// The ground as one sees it: coloured by height, slope and hidden layers.
 
 // ---- Ground colours: linear albedo ----
 const SAND: vec3<f32> = vec3<f32>(0.40, 0.35, 0.23);
@@ -46,49 +46,6 @@ const REFLECTED_SKY: vec3<f32> = vec3<f32>(0.030, 0.044, 0.062); // per SUN_LIGH
 const EVEN_LIGHT: f32 = 0.34;                         // of SUN_LIGHT, from all sides
 const MOON_ASIDE: f32 = 1.2;                          // tangent of the moon's way off the sun's axis
 const AIRLESS_LIGHT: f32 = 0.012;                     // light of the ground on the ground
-
-struct Ground {
-    @location(0) hi: vec3<f32>,
-    @location(1) lo: vec3<f32>,
-    @location(2) normal_oct: vec2<f32>,
-    @location(3) layers: vec4<f32>,
-    @location(4) height_m: f32,
-}
-
-struct Point {
-    @invariant @builtin(position) position: vec4<f32>,
-    @location(0) offset: vec3<f32>,
-    @location(1) normal: vec3<f32>,
-    @location(2) layers: vec4<f32>,
-    @location(3) height_m: f32,
-}
-
-// Inverse of the octahedral map: z > 0 is the inner diamond, z < 0 is folded outwards.
-fn unfolded(e: vec2<f32>) -> vec3<f32> {
-    let z = 1.0 - abs(e.x) - abs(e.y);
-    let fold = max(-z, 0.0);
-    let x = e.x + select(fold, -fold, e.x >= 0.0);
-    let y = e.y + select(fold, -fold, e.y >= 0.0);
-    return normalize(vec3<f32>(x, y, z));
-}
-
-@vertex
-fn vertex(ground: Ground) -> Point {
-    let offset = relative_to(ground.hi, ground.lo, view.eye_hi, view.eye_lo);
-    let away = dot(view.forward, offset);
-    var out: Point;
-    out.position = vec4<f32>(
-        dot(view.right, offset) * view.inverse_tan_x,
-        -(dot(view.up, offset) * view.inverse_tan_y),
-        view.depth_slope * away + view.depth_offset,
-        away,
-    );
-    out.offset = offset;
-    out.normal = unfolded(ground.normal_oct);
-    out.layers = ground.layers;
-    out.height_m = ground.height_m;
-    return out;
-}
 
 fn ramp(ends: vec2<f32>, x: f32) -> f32 {
     let t = clamp((x - ends.x) / (ends.y - ends.x), 0.0, 1.0);

@@ -25,6 +25,21 @@ pub enum StartError {
         /// The newest version found.
         found: String,
     },
+    /// The best device lacks something that drawing needs.
+    NoFeature {
+        /// Vulkan's name of it.
+        feature: &'static str,
+    },
+    /// The device has no depth buffer of the format that was asked for.
+    NoDepthFormat {
+        /// The format.
+        format: &'static str,
+    },
+    /// There is no way to draw to this window.
+    NoSurface {
+        /// Why.
+        reason: String,
+    },
     /// The driver does not keep float arithmetic as written: terrain would jitter.
     Contracted {
         /// How many of the test's answers were wrong.
@@ -86,6 +101,24 @@ pub enum DrawError {
         /// The slot.
         slot: u32,
     },
+    /// A range draws more patches than the arena has.
+    Draws {
+        /// Patches of the range.
+        found: usize,
+        /// Slots of the renderer's arena.
+        max: u32,
+    },
+    /// The arena has morphs and the renderer does not draw them, or the other way round.
+    Morphs {
+        /// Vertices of the arena that have one.
+        found: usize,
+    },
+    /// The new size is beyond what the device can draw.
+    Resize(Box<StartError>),
+    /// The depth is kept only where the settings ask for it.
+    NoDepthKept,
+    /// This renderer draws without a window.
+    NoWindow,
     /// Nothing was drawn yet, so there is nothing to read.
     NothingDrawn,
     /// A Vulkan call failed.
@@ -153,6 +186,11 @@ impl fmt::Display for StartError {
                  on Debian it is the package vulkan-validationlayers"
             ),
             Self::TooOld { found } => write!(f, "Vulkan {found} is too old, 1.1 is needed"),
+            Self::NoFeature { feature } => write!(f, "the Vulkan device has no {feature}"),
+            Self::NoDepthFormat { format } => {
+                write!(f, "the Vulkan device cannot draw with depth.format {format}")
+            }
+            Self::NoSurface { reason } => write!(f, "cannot draw to the window: {reason}"),
             Self::Contracted { wrong, of } => write!(
                 f,
                 "the driver reorders float arithmetic: {wrong} of {of} two-sums are wrong"
@@ -183,6 +221,18 @@ impl fmt::Display for DrawError {
                 found.1, found.0, renderer.1, renderer.0
             ),
             Self::Slot { slot } => write!(f, "the view draws slot {slot}, which holds no patch"),
+            Self::Draws { found, max } => {
+                write!(f, "a range draws {found} patches, the renderer has room for {max}")
+            }
+            Self::Morphs { found } => {
+                write!(
+                    f,
+                    "the arena has {found} morphs, which is not what the renderer is made for"
+                )
+            }
+            Self::Resize(error) => error.fmt(f),
+            Self::NoDepthKept => write!(f, "keep_depth is off, so no depth was kept"),
+            Self::NoWindow => write!(f, "this renderer has no window"),
             Self::NothingDrawn => write!(f, "nothing was drawn yet"),
             Self::Vulkan { call, result } => write!(f, "{call} failed: {result}"),
             Self::Memory { name, bytes } => write_memory(f, name, *bytes),

@@ -1,9 +1,9 @@
-//! Draws a view of the planet with Vulkan, without a window.
+//! Draws a view of the planet with Vulkan, into pictures or into a window.
 //!
-//! In:    [`ViewDraws`] and [`Patches`] of a frame, [`FrameParts`], a [`Team`].
+//! In:    a [`Picture`]: draws and patches of a frame, what to show; a [`Team`].
 //! Out:   a picture, [`DrawReport`], [`StartError`] or [`DrawError`].
 //! Keeps: Vulkan objects; which patch slots the device has.
-//! Not here: what is drawn (`overfly_core`), windows.
+//! Not here: what is drawn (`overfly_core`), windows and their events (the host).
 //!
 //! The Vulkan loader is found at run time: a program without it, or without a driver, gets a
 //! [`StartError`] that says what to install.
@@ -12,16 +12,23 @@
 //!
 //! Vertices of patches that are new on the device are staged and copied. Each depth range, from far
 //! to near, is one instance of a render pass that clears the depth; the farthest clears the colour
-//! and ends with the sky. Patches are recorded into secondary command buffers, in parallel. Two
-//! frames are in flight: recording one overlaps with the device drawing the other.
+//! and ends with the sky, the nearest ends with the overlay. The rows of one multi-draw-indirect a
+//! range, and the vertices that the host places, are written in parallel; so are the secondary
+//! command buffers. Two frames are in flight: recording one overlaps with the device drawing the
+//! other. A window gets a copy of the finished picture.
 #![deny(unsafe_code)]
 
 mod error;
+mod eye;
 mod matrices;
+mod overlay;
 mod passes;
+mod picture;
 #[expect(unsafe_code, reason = "recording is calls of Vulkan")]
 mod record;
+mod rings;
 mod self_test;
+mod settings;
 mod shaders;
 mod targets;
 mod upload;
@@ -29,38 +36,30 @@ mod upload;
 mod vk;
 
 pub use crate::error::{DrawError, StartError};
+pub use crate::overlay::{CELL_PX, Colour, Overlay};
+pub use crate::picture::{Backdrop, Picture, Show};
+pub use crate::settings::RendererSettings;
 pub use crate::vk::instance::{DeviceInfo, devices, layers};
+pub use crate::vk::swapchain::Presented;
 
-use crate::matrices::ViewTerms;
-use crate::passes::Passes;
+use crate::matrices::{Fixed, ViewTerms};
+use crate::overlay::OverlayVertex;
+use crate::passes::{PassInfo, Passes};
 use crate::record::{Frame, Scene};
-use crate::targets::Targets;
-use crate::upload::{Arena, Staged};
+use crate::targets::{RangePasses, Targets};
+use crate::upload::{Arena, Copies, Staged};
 use crate::vk::buffer::{Buffer, BufferInfo};
+use crate::vk::instance::Window;
+use crate::vk::swapchain::Swapchain;
 use crate::vk::{Device, commands::OneOff, transfer};
 use gpu_allocator::MemoryLocation;
-use overfly_core::frame::data::ViewDraws;
+use overfly_core::frame::data::DeviceTotals;
+use overfly_core::geodesy::narrow;
 use overfly_core::mesh::{Patches, topology};
-use overfly_core::scene::FrameParts;
+use overfly_core::settings::DepthFormat;
 use overfly_jobs::Team;
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::sync::Arc;
-
-/// What a renderer is made for. All memory is taken at the start.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct RendererSettings {
-    /// A patch is 2^k triangles; 0, 2, 4, 6 or 8, as in the scene's settings.
-    pub patch_depth: u8,
-    /// Slots of the patch arena; at least 1.
-    pub patches_max: u32,
-    /// Width and height of the pictures in pixels.
-    pub size_px: [u32; 2],
-    /// Most depth ranges of a view; 1 to 16.
-    pub ranges_max: u32,
-    /// Pictures that the device may be behind; 1 to 4, usually 2.
-    pub frames_in_flight: u32,
-    /// Whether to run under the validation layer, with synchronisation checks. Slow.
-    pub validation: bool,
-}
 
 /// How much work a picture was.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -71,57 +70,108 @@ pub struct DrawReport {
     pub uploaded_bytes: u64,
     /// Patches drawn, summed over depth ranges; the sky is not counted.
     pub draws: u32,
+    /// Indirect draw commands that draw them.
+    pub commands: u32,
     /// Secondary command buffers, the sky's included.
     pub secondaries: u32,
     /// Triangles of all draws.
     pub triangles: u64,
+    /// Pipelines made so far; the same from frame to frame unless a new kind of view is asked for.
+    pub pipelines: u32,
 }
 
-/// Draws pictures of one size.
+/// Most depth ranges of a view.
+const RANGES_MAX: u32 = 16;
+
+/// Draws pictures of one size, which can be changed.
 pub struct Renderer {
     settings: RendererSettings,
+    fixed: Fixed,
+    range_passes: RangePasses,
     targets: Targets,
     passes: Passes,
     arena: Arena,
     one_off: OneOff,
     frames: Vec<Frame>,
     next_frame: usize,
-    copies: Vec<ash::vk::BufferCopy>,
+    copies: Copies,
+    corners: Vec<OverlayVertex>,
+    /// All live slots, for the view that shows what was culled.
+    live: Vec<u32>,
     drawn: bool,
+    window: Option<Swapchain>,
     device: Arc<Device>,
 }
 
 impl Renderer {
-    /// Opens the best device and takes all memory.
+    /// Opens the best device and takes all memory. Draws without a window.
     ///
     /// # Errors
     /// [`StartError`]: no loader, driver or layer, a setting beyond the device, a driver that
     /// reorders float arithmetic, or a failed call.
     pub fn new(settings: &RendererSettings) -> Result<Self, StartError> {
-        check(settings)?;
-        let device = Arc::new(Device::new(settings.validation)?);
-        check_limits(settings, &device.limits)?;
+        Self::start(settings, None)
+    }
+
+    /// As [`Self::new`], on the best device that can draw to a window; [`Self::present`] shows
+    /// pictures there. The renderer keeps `window` for as long as it lives.
+    ///
+    /// # Errors
+    /// As [`Self::new`], or [`StartError::NoSurface`].
+    pub fn for_window<W>(settings: &RendererSettings, window: Arc<W>) -> Result<Self, StartError>
+    where
+        W: HasWindowHandle + HasDisplayHandle + Send + Sync + 'static,
+    {
+        let reason =
+            |e: raw_window_handle::HandleError| StartError::NoSurface { reason: e.to_string() };
+        let display = window.display_handle().map_err(reason)?.as_raw();
+        let handle = window.window_handle().map_err(reason)?.as_raw();
+        Self::start(settings, Some(Window { display, window: handle, owner: window }))
+    }
+
+    fn start(settings: &RendererSettings, window: Option<Window>) -> Result<Self, StartError> {
+        settings.check()?;
+        let has_window = window.is_some();
+        let device = Arc::new(Device::new(settings.validation, window)?);
+        RendererSettings::check_size(settings.size_px, &device.limits)?;
         let mut one_off = OneOff::new(&device)?;
         self_test::run(&device, &mut one_off)?;
-        let targets = Targets::new(&device, settings.size_px)?;
-        let passes = Passes::new(&device, &targets)?;
-        let (depth, slots) = (settings.patch_depth, settings.patches_max);
-        let arena = Arena::new(&device, &mut one_off, depth, slots)?;
+        let range_passes = RangePasses::new(&device, settings.depth_format, settings.keep_depth)?;
+        let targets = Targets::new(&device, &range_passes, settings.size_px)?;
+        let info = PassInfo { device: &device, passes: &range_passes, settings };
+        let passes = Passes::new(&info)?;
+        let arena = Arena::new(&device, &mut one_off, settings)?;
         let frames = (0..settings.frames_in_flight)
-            .map(|index| Frame::new(&device, &arena, index))
+            .map(|index| Frame::new(&device, &arena, (&passes, settings), index))
             .collect::<Result<_, _>>()?;
+        let window = has_window.then(|| Swapchain::new(&device, settings.size_px)).transpose()?;
         Ok(Self {
             settings: *settings,
+            fixed: Fixed {
+                morph_ms: narrow(f64::from(settings.morph_ms())),
+                tolerance_px: narrow(settings.tolerance_px),
+                vertices_per_patch: settings.vertices_per_patch(),
+                segments: narrow(f64::from(topology::segments(settings.patch_depth))),
+            },
+            range_passes,
             targets,
             passes,
             arena,
             one_off,
             frames,
             next_frame: 0,
-            copies: Vec::new(),
+            copies: Copies::default(),
+            corners: Vec::new(),
+            live: Vec::new(),
             drawn: false,
+            window,
             device,
         })
+    }
+
+    /// What it was made for; the size as it is now.
+    pub fn settings(&self) -> &RendererSettings {
+        &self.settings
     }
 
     /// Tells which slots were built in a frame: their vertices on the device are out of date. To
@@ -130,7 +180,29 @@ impl Renderer {
         self.arena.mark(slots);
     }
 
-    /// Draws a view. Returns once the work is submitted; at most
+    /// Changes the size of the pictures, and tells the window's chain of it. Waits for all
+    /// pictures that are being drawn.
+    ///
+    /// # Errors
+    /// [`DrawError::Resize`]: beyond the device, the size stays as it was; or a failed call.
+    pub fn resize(&mut self, size_px: [u32; 2]) -> Result<(), DrawError> {
+        let limits = &self.device.limits;
+        RendererSettings::check_size(size_px, limits)
+            .map_err(|error| DrawError::Resize(Box::new(error)))?;
+        if let Some(window) = &mut self.window {
+            window.resize(size_px);
+        }
+        if size_px != self.settings.size_px {
+            self.wait()?;
+            self.device.wait_idle()?;
+            self.targets = Targets::new(&self.device, &self.range_passes, size_px)?;
+            self.settings.size_px = size_px;
+            self.drawn = false;
+        }
+        Ok(())
+    }
+
+    /// Draws a picture. Returns once the work is submitted; at most
     /// [`RendererSettings::frames_in_flight`] pictures are unfinished.
     ///
     /// # Errors
@@ -138,14 +210,11 @@ impl Renderer {
     /// every patch is uploaded again.
     pub fn draw(
         &mut self,
-        view: &ViewDraws,
-        patches: &Patches,
-        parts: &FrameParts,
+        picture: &Picture<'_>,
         team: &Team<'_>,
     ) -> Result<DrawReport, DrawError> {
-        self.check_draw(view, patches)?;
-        let terms = ViewTerms::new(&view.camera, parts);
-        let report = self.draw_checked(view, terms, patches, team);
+        self.check_draw(picture)?;
+        let report = self.draw_checked(picture, team);
         if report.is_err() {
             self.arena.mark_all();
         }
@@ -154,35 +223,59 @@ impl Renderer {
 
     fn draw_checked(
         &mut self,
-        view: &ViewDraws,
-        terms: ViewTerms,
-        patches: &Patches,
+        picture: &Picture<'_>,
         team: &Team<'_>,
     ) -> Result<DrawReport, DrawError> {
         let frame = self.next_frame;
         self.next_frame = (frame + 1) % self.frames.len();
         self.frames[frame].fence.wait()?;
-        let uploaded = self.stage(frame, patches)?;
+        let uploaded = self.stage(frame, picture.patches)?;
+        let settings = &self.settings;
+        let info = PassInfo { device: &self.device, passes: &self.range_passes, settings };
+        let is_debug = picture.show != Show::Shaded;
+        self.passes.complete(&info, (is_debug, !picture.overlay.is_empty()))?;
+        let mut lists: [&[u32]; RANGES_MAX as usize] = [&[]; RANGES_MAX as usize];
+        let lists = &mut lists[..picture.view.ranges.len()];
+        if picture.show == Show::Culled {
+            let slots = (0_u32..).zip(&picture.patches.leaf);
+            self.live.clear();
+            self.live.extend(slots.filter(|(_, leaf)| leaf.is_some()).map(|(slot, _)| slot));
+            lists.fill(&self.live);
+        } else {
+            let ranges = picture.view.ranges.iter().map(|range| &range.patches[..]);
+            lists.iter_mut().zip(ranges).for_each(|(list, range)| *list = range);
+        }
+        let Frame { rings, .. } = &mut self.frames[frame];
+        rings.write_view(ViewTerms::new(picture, &self.fixed));
+        rings.write_places(picture, lists.iter().copied(), settings.morph_ms(), team);
+        rings.write_overlay(picture, &mut self.corners)?;
+        if is_debug {
+            rings.write_infos(&self.passes, settings.patches_max, picture.infos)?;
+        }
         let scene = Scene {
             device: &self.device,
+            settings,
+            range_passes: &self.range_passes,
             targets: &self.targets,
             passes: &self.passes,
             arena: &self.arena,
-            view,
-            terms,
+            picture,
+            lists,
         };
         let frame = &mut self.frames[frame];
-        let secondaries = frame.record_secondaries(&scene, team)?;
+        let (secondaries, commands) = frame.record_secondaries(&scene, team)?;
         let primary = frame.record_primary(&scene, &self.copies)?;
         frame.fence.submit(primary)?;
         self.drawn = true;
-        let draws: usize = view.ranges.iter().map(|range| range.patches.len()).sum();
+        let draws: usize = lists.iter().map(|list| list.len()).sum();
         Ok(DrawReport {
             uploaded_patches: uploaded.patches,
             uploaded_bytes: uploaded.bytes,
             draws: u32::try_from(draws).expect("slots and ranges are few"),
+            commands,
             secondaries,
             triangles: (draws as u64) << self.settings.patch_depth,
+            pipelines: self.passes.count(),
         })
     }
 
@@ -198,16 +291,13 @@ impl Renderer {
             if !part.more {
                 return Ok(all);
             }
-            let (staging, vertices) = (&self.frames[frame].staging, &self.arena.vertices);
-            let copies = &self.copies;
-            self.one_off.run(|device, buffer| {
-                transfer::copies(device, buffer, (staging, vertices), copies);
-            })?;
+            let (staging, arena, copies) = (&self.frames[frame].staging, &self.arena, &self.copies);
+            self.one_off.run(|device, buffer| copies.record(device, buffer, (staging, arena)))?;
         }
     }
 
-    fn check_draw(&self, view: &ViewDraws, patches: &Patches) -> Result<(), DrawError> {
-        let settings = &self.settings;
+    fn check_draw(&self, picture: &Picture<'_>) -> Result<(), DrawError> {
+        let (settings, view, patches) = (&self.settings, picture.view, picture.patches);
         if view.camera.size_px != settings.size_px {
             let renderer = settings.size_px;
             return Err(DrawError::Size { view: view.camera.size_px, renderer });
@@ -221,6 +311,13 @@ impl Renderer {
         if found.0 != renderer.0 || found.1 > renderer.1 as usize {
             return Err(DrawError::Patches { found, renderer });
         }
+        if settings.morphs() == patches.morphs.is_empty() {
+            return Err(DrawError::Morphs { found: patches.morphs.len() });
+        }
+        let longest = view.ranges.iter().map(|range| range.patches.len()).max().unwrap_or(0);
+        if longest > settings.patches_max as usize {
+            return Err(DrawError::Draws { found: longest, max: settings.patches_max });
+        }
         let live = |slot: u32| matches!(patches.leaf.get(slot as usize), Some(Some(_)));
         let mut slots = view.ranges.iter().flat_map(|range| &range.patches);
         match slots.find(|&&slot| !live(slot)) {
@@ -229,25 +326,63 @@ impl Renderer {
         }
     }
 
+    /// Shows the last picture in the window, scaled where their sizes differ.
+    ///
+    /// # Errors
+    /// [`DrawError::NoWindow`], [`DrawError::NothingDrawn`], or a failed call.
+    pub fn present(&mut self) -> Result<Presented, DrawError> {
+        let Some(window) = &mut self.window else { return Err(DrawError::NoWindow) };
+        if !self.drawn {
+            return Err(DrawError::NothingDrawn);
+        }
+        Ok(window.present(&self.targets.colour, self.settings.size_px)?)
+    }
+
     /// The last picture, once it is finished: four bytes a pixel, red, green, blue with the sRGB
     /// curve and 255; rows from the top.
     ///
     /// # Errors
     /// [`DrawError::NothingDrawn`] before the first draw, or a failed call.
     pub fn read_pixels(&mut self) -> Result<Vec<u8>, DrawError> {
+        self.read(false)
+    }
+
+    /// The depth of the nearest range in the last picture, rows from the top: from 0 to 1 as the
+    /// settings' format and order have it, cleared where that range drew nothing.
+    ///
+    /// # Errors
+    /// [`DrawError::NoDepthKept`] if the settings do not ask for it, [`DrawError::NothingDrawn`]
+    /// before the first draw, or a failed call.
+    pub fn read_depth(&mut self) -> Result<Vec<f32>, DrawError> {
+        if !self.settings.keep_depth {
+            return Err(DrawError::NoDepthKept);
+        }
+        let bytes = self.read(true)?;
+        let words = bytes.chunks_exact(4).map(|b| [b[0], b[1], b[2], b[3]]);
+        Ok(match self.settings.depth_format {
+            DepthFormat::D32F => words.map(f32::from_ne_bytes).collect(),
+            DepthFormat::D24 => {
+                let depth = |b| f64::from(u32::from_ne_bytes(b) & 0xff_ffff) / f64::from(0xff_ffff);
+                words.map(|b| narrow(depth(b))).collect()
+            }
+        })
+    }
+
+    fn read(&mut self, depth: bool) -> Result<Vec<u8>, DrawError> {
         if !self.drawn {
             return Err(DrawError::NothingDrawn);
         }
         let targets = &self.targets;
+        let image = if depth { &targets.depth } else { &targets.colour };
         self.one_off.run(|device, buffer| {
-            transfer::read_back(
-                device,
-                buffer,
-                (&targets.colour, &targets.pixels),
-                targets.size_px,
-            );
+            transfer::read_back(device, buffer, (image, &targets.pixels), targets.size_px);
         })?;
         Ok(targets.pixels.mapped().to_vec())
+    }
+
+    /// Device memory that is taken now.
+    pub fn device_totals(&self) -> DeviceTotals {
+        self.device.memory.totals()
     }
 
     /// Waits until the device has finished all pictures: for those who measure.
@@ -293,48 +428,4 @@ impl Drop for Renderer {
         // Owners may be destroyed only when nothing uses them. A lost device uses nothing.
         let _ = self.device.wait_idle();
     }
-}
-
-fn setting(field: &'static str, found: u64, allowed: String) -> Result<(), StartError> {
-    Err(StartError::Setting { field, found, allowed })
-}
-
-/// Checks what does not depend on the device.
-fn check(settings: &RendererSettings) -> Result<(), StartError> {
-    let depth = settings.patch_depth;
-    if depth > 8 || depth % 2 == 1 {
-        return setting("patch_depth", depth.into(), "0, 2, 4, 6 or 8".into());
-    }
-    let segments = topology::segments(depth);
-    let vertices_per_patch = (segments + 1) * (segments + 2) / 2;
-    // Vertex offsets of draws are signed.
-    let patches_end = i32::MAX.unsigned_abs() / vertices_per_patch;
-    for (field, found, max) in [
-        ("patches_max", settings.patches_max, patches_end),
-        ("ranges_max", settings.ranges_max, 16),
-        ("frames_in_flight", settings.frames_in_flight, 4),
-    ] {
-        if found == 0 || found > max {
-            return setting(field, found.into(), format!("1 to {max}"));
-        }
-    }
-    Ok(())
-}
-
-/// Checks the picture's size.
-fn check_limits(
-    settings: &RendererSettings,
-    limits: &ash::vk::PhysicalDeviceLimits,
-) -> Result<(), StartError> {
-    let image = limits.max_image_dimension2_d;
-    let largest = [
-        image.min(limits.max_framebuffer_width).min(limits.max_viewport_dimensions[0]),
-        image.min(limits.max_framebuffer_height).min(limits.max_viewport_dimensions[1]),
-    ];
-    for (found, max) in settings.size_px.into_iter().zip(largest) {
-        if found == 0 || found > max {
-            return setting("size_px", found.into(), format!("1 to {max}"));
-        }
-    }
-    Ok(())
 }

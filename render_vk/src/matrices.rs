@@ -1,60 +1,134 @@
-//! What the shaders know of a view: eye, rotation, projection, light.
+//! What the shaders know of a view: eye, rotation, projection, light, time.
 //!
 //! In:    the camera of a view, the parts of the frame, a depth range.
-//! Out:   [`ViewTerms`]: push constants.
+//! Out:   [`ViewTerms`], a uniform block; [`RangeTerms`], push constants.
 //! Keeps: nothing.
-//! Not here: the shaders' side of the same block (`shaders/air.wgsl`).
+//! Not here: the shaders' side of the same blocks (`shaders/view.wgsl`).
 
+use crate::picture::{Picture, Show};
 use glam::DVec3;
-use overfly_core::camera::Camera;
 use overfly_core::geodesy::narrow;
-use overfly_core::scene::FrameParts;
+use overfly_core::settings::DepthOrder;
 
-/// The shaders' `View`: 124 bytes as thirty-one floats, below the 128 that every device takes.
+/// The shaders' `View`: what is the same in all depth ranges of a picture.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct ViewTerms(pub(crate) [f32; 31]);
+#[repr(C)]
+pub(crate) struct ViewTerms {
+    eye_hi: [f32; 3],
+    air: f32,
+    eye_lo: [f32; 3],
+    sea: f32,
+    right: [f32; 3],
+    inverse_tan_x: f32,
+    up: [f32; 3],
+    inverse_tan_y: f32,
+    forward: [f32; 3],
+    body_radius_m: f32,
+    eye_up: [f32; 3],
+    eye_height_m: f32,
+    sun: [f32; 3],
+    sun_on: f32,
+    /// The eye's place in a cube of [`DETAIL_M`], so that textures are fixed to the body.
+    detail_m: [f32; 3],
+    pixel_rad: f32,
+    now_ms: u32,
+    morph_ms: f32,
+    show: u32,
+    tolerance_px: f32,
+    vertices_per_patch: u32,
+    segments: f32,
+    pixels_inverse: [f32; 2],
+}
+
+const _: () = assert!(size_of::<ViewTerms>() == 160);
+
+/// Textures repeat in a whole number of periods along this many metres of every axis.
+const DETAIL_M: f64 = 4096.0;
+
+/// What of a renderer's settings the shaders know.
+#[derive(Clone, Copy)]
+pub(crate) struct Fixed {
+    pub(crate) morph_ms: f32,
+    pub(crate) tolerance_px: f32,
+    pub(crate) vertices_per_patch: u32,
+    pub(crate) segments: f32,
+}
 
 impl ViewTerms {
-    /// All terms but the depth range's.
-    pub(crate) fn new(camera: &Camera, parts: &FrameParts) -> Self {
+    pub(crate) fn new(picture: &Picture<'_>, fixed: &Fixed) -> Self {
+        let (camera, parts) = (&picture.view.camera, picture.parts);
         let eye = camera.eye.two_float();
         let flag = |on: bool| if on { 1.0 } else { 0.0 };
         let [tan_x, tan_y] = camera.half_tangents;
-        let radius_m = camera.eye.0.length() - camera.height_m;
-        // Only bodies with a sea have air, until scenes name their atmosphere.
-        let air = flag(parts.sea);
         let sun = parts.sun_direction.map_or(camera.normal, DVec3::normalize);
-        let rows = [
-            (eye.hi, air),
-            (eye.lo, flag(parts.sea)),
-            (narrowed(camera.right), narrow(1.0 / tan_x)),
-            (narrowed(camera.up), narrow(1.0 / tan_y)),
-            (narrowed(camera.forward), narrow(radius_m)),
-            (narrowed(camera.normal), narrow(camera.height_m)),
-            (narrowed(sun), flag(parts.sun_direction.is_some())),
-        ];
-        let mut terms = [0.0; 31];
-        for (row, (vector, last)) in terms.chunks_exact_mut(4).zip(rows) {
-            row[..3].copy_from_slice(&vector);
-            row[3] = last;
+        Self {
+            eye_hi: eye.hi,
+            // Only bodies with a sea have air, until scenes name their atmosphere.
+            air: flag(parts.sea),
+            eye_lo: eye.lo,
+            sea: flag(parts.sea),
+            right: narrowed(camera.right),
+            inverse_tan_x: narrow(1.0 / tan_x),
+            up: narrowed(camera.up),
+            inverse_tan_y: narrow(1.0 / tan_y),
+            forward: narrowed(camera.forward),
+            body_radius_m: narrow(camera.eye.0.length() - camera.height_m),
+            eye_up: narrowed(camera.normal),
+            eye_height_m: narrow(camera.height_m),
+            sun: narrowed(sun),
+            sun_on: flag(parts.sun_direction.is_some()),
+            detail_m: narrowed(camera.eye.0 - (camera.eye.0 / DETAIL_M).floor() * DETAIL_M),
+            pixel_rad: narrow(1.0 / camera.pixels_per_radian),
+            now_ms: picture.time_ms,
+            morph_ms: fixed.morph_ms,
+            show: picture.show.code(),
+            tolerance_px: fixed.tolerance_px,
+            vertices_per_patch: fixed.vertices_per_patch,
+            segments: fixed.segments,
+            pixels_inverse: camera.size_px.map(|n| narrow(1.0 / f64::from(n))),
         }
-        terms[30] = narrow(1.0 / camera.pixels_per_radian);
-        Self(terms)
     }
+}
 
-    /// The same view cut to one depth range.
-    ///
-    /// Clip z is slope · w + offset: with 1 near and 0 far, whatever the range, so that x, y and w
-    /// of a vertex are the same bits in every range. An infinite far border has slope 0.
-    pub(crate) fn in_range(mut self, near_m: f64, far_m: f64) -> Self {
+impl Show {
+    fn code(self) -> u32 {
+        self as u32
+    }
+}
+
+/// The shaders' `Range`: how depth runs in one depth range.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(C)]
+pub(crate) struct RangeTerms {
+    /// Clip z is slope · w + offset, so that x, y and w of a vertex are the same bits in every
+    /// range.
+    slope: f32,
+    offset: f32,
+    /// Depth of what is infinitely far.
+    far: f32,
+    index: u32,
+}
+
+const _: () = assert!(size_of::<RangeTerms>() == 16);
+
+impl RangeTerms {
+    /// The terms of range `index`, from `near_m` to `far_m`, which may be infinite.
+    pub(crate) fn new(order: DepthOrder, [near_m, far_m]: [f64; 2], index: usize) -> Self {
+        // Reversed: 1 at the near border and 0 at the far one.
         let (slope, offset) = if far_m.is_finite() {
             (-near_m / (far_m - near_m), near_m * (far_m / (far_m - near_m)))
         } else {
             (0.0, near_m)
         };
-        self.0[28] = narrow(slope);
-        self.0[29] = narrow(offset);
-        self
+        let index = u32::try_from(index).expect("ranges are few");
+        match order {
+            DepthOrder::Reversed => {
+                Self { slope: narrow(slope), offset: narrow(offset), far: 0.0, index }
+            }
+            DepthOrder::Forward => {
+                Self { slope: narrow(1.0 - slope), offset: narrow(-offset), far: 1.0, index }
+            }
+        }
     }
 }
 
@@ -65,48 +139,30 @@ fn narrowed(v: DVec3) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use overfly_core::camera::{View, orientation_from_attitude};
-    use overfly_core::geodesy::{Ellipsoid, Geodetic};
-    use overfly_core::units::Radians;
 
-    fn terms() -> ViewTerms {
-        let at = Geodetic::from_degrees(47.0, 11.0, 2000.0);
-        let level = Radians(0.0);
-        let view = View {
-            eye: Ellipsoid::WGS84.ecef_from_geodetic(at),
-            orientation: orientation_from_attitude(at, level, level, level),
-            field_of_view: Radians::from_degrees(60.0),
-            size_px: [1280, 720],
-            near_m: 0.1,
-        };
-        let camera = Camera::new(&view, &Ellipsoid::WGS84);
-        ViewTerms::new(&camera, &FrameParts { sun_direction: None, sea: true })
+    fn depth(terms: &RangeTerms, w: f32) -> f32 {
+        (terms.slope * w + terms.offset) / w
     }
 
     #[test]
-    fn depth_is_one_at_the_near_border_and_zero_at_the_far_one() {
-        let depth = |terms: &ViewTerms, w: f32| (terms.0[28] * w + terms.0[29]) / w;
-        let finite = terms().in_range(10.0, 1000.0);
+    fn reversed_depth_is_one_at_the_near_border_and_zero_at_the_far_one() {
+        let finite = RangeTerms::new(DepthOrder::Reversed, [10.0, 1000.0], 0);
         assert!((depth(&finite, 10.0) - 1.0).abs() < 1e-6);
         assert!(depth(&finite, 1000.0).abs() < 1e-6);
         assert!(depth(&finite, 100.0) > depth(&finite, 200.0));
-        let infinite = terms().in_range(10.0, f64::INFINITY);
+        let infinite = RangeTerms::new(DepthOrder::Reversed, [10.0, f64::INFINITY], 1);
         assert_eq!(depth(&infinite, 10.0), 1.0);
         assert!(depth(&infinite, 1e7) > 0.0);
     }
 
     #[test]
-    fn a_range_changes_depth_terms_only() {
-        let (a, b) = (terms().in_range(0.1, 100.0), terms().in_range(99.0, f64::INFINITY));
-        assert_eq!(a.0[..28], b.0[..28]);
-        assert_ne!(a.0[28..30], b.0[28..30]);
-        assert_eq!(a.0[30], b.0[30]);
-    }
-
-    #[test]
-    fn the_bodys_radius_is_the_one_under_the_eye() {
-        let radius_m = terms().0[19];
-        assert!((6.356e6..6.379e6).contains(&radius_m), "{radius_m}");
-        assert_eq!(terms().0[23], 2000.0);
+    fn forward_depth_is_zero_at_the_near_border_and_one_at_the_far_one() {
+        let finite = RangeTerms::new(DepthOrder::Forward, [10.0, 1000.0], 0);
+        assert!(depth(&finite, 10.0).abs() < 1e-6);
+        assert!((depth(&finite, 1000.0) - 1.0).abs() < 1e-6);
+        assert!(depth(&finite, 100.0) < depth(&finite, 200.0));
+        let infinite = RangeTerms::new(DepthOrder::Forward, [10.0, f64::INFINITY], 0);
+        assert_eq!((depth(&infinite, 10.0), infinite.far), (0.0, 1.0));
+        assert!(depth(&infinite, 1e5) < 1.0);
     }
 }

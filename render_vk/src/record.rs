@@ -1,49 +1,57 @@
 //! Records the command buffers of a frame.
 //!
-//! In:    a view's draws cut into chunks, pipelines, targets, staged copies.
-//! Out:   one secondary buffer a chunk, one for the sky, one primary over all.
-//! Keeps: command pools, buffers, fence and staging of each frame in flight.
+//! In:    a picture's draws cut into chunks, pipelines, targets, staged copies.
+//! Out:   one secondary buffer a chunk, one for the sky, one for the overlay, one primary over all.
+//! Keeps: command pools, buffers, fence, staging and rings of each frame in flight.
 //! Not here: who calls when (`Renderer`).
 //!
-//! Chunks of 256 patches are dealt to a fixed number of lanes, each with its own command pool, so
-//! any worker can record any lane, and what is recorded follows from the draws alone.
+//! Each (range, chunk of patches) is one secondary buffer with one multi-draw-indirect, whose rows
+//! the workers write together; nearly always a range is one chunk. Chunks are dealt to a fixed
+//! number of lanes, each with its own command pool, so any worker can record any lane, and what is
+//! recorded follows from the draws alone.
 
 use crate::error::{DrawError, Fault, failed};
-use crate::matrices::ViewTerms;
+use crate::matrices::RangeTerms;
+use crate::passes::terrain::{MORPHS, PLACES, VERTICES};
 use crate::passes::{Passes, VIEW_STAGES};
-use crate::targets::Targets;
-use crate::upload::Arena;
+use crate::picture::{Backdrop, Picture, Show};
+use crate::rings::Rings;
+use crate::settings::RendererSettings;
+use crate::targets::{RangePasses, Targets};
+use crate::upload::{Arena, Copies};
 use crate::vk::buffer::bytes_of;
 use crate::vk::commands::{Fence, Pool, begin, end};
 use crate::vk::pipeline::RenderPass;
-use crate::vk::{Buffer, Device, transfer};
+use crate::vk::{Buffer, Device};
 use ash::vk;
-use overfly_core::frame::data::ViewDraws;
+use overfly_core::settings::DepthOrder;
 use overfly_jobs::Team;
 use std::sync::Arc;
 
-/// Patches in one secondary buffer: some 20 µs of recording.
-const CHUNK_PATCHES: usize = 256;
+/// Patches in one secondary buffer: fewer than every device draws with one indirect call.
+const CHUNK_PATCHES: usize = 16_384;
 /// Command pools of a frame in flight; no more threads than this can record at once.
-const LANES: usize = 32;
+const LANES: usize = 16;
 
 /// What all recording of a frame reads.
 pub(crate) struct Scene<'a> {
     pub(crate) device: &'a Device,
+    pub(crate) settings: &'a RendererSettings,
+    pub(crate) range_passes: &'a RangePasses,
     pub(crate) targets: &'a Targets,
     pub(crate) passes: &'a Passes,
     pub(crate) arena: &'a Arena,
-    pub(crate) view: &'a ViewDraws,
-    /// The view's terms; those of the depth range are set by chunk.
-    pub(crate) terms: ViewTerms,
+    pub(crate) picture: &'a Picture<'a>,
+    /// Slots to draw in each range.
+    pub(crate) lists: &'a [&'a [u32]],
 }
 
-/// Patches `first .. end` of a range's list.
+/// Some rows of a range's draws.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Chunk {
     range: usize,
-    first: usize,
-    end: usize,
+    first_row: usize,
+    rows: usize,
 }
 
 /// A command pool and its secondary buffers.
@@ -57,26 +65,36 @@ struct Lane {
 pub(crate) struct Frame {
     pub(crate) fence: Fence,
     pub(crate) staging: Buffer,
+    pub(crate) rings: Rings,
     pool: Pool,
     primary: vk::CommandBuffer,
     sky: vk::CommandBuffer,
+    overlay: vk::CommandBuffer,
     lanes: Vec<Lane>,
     chunks: Vec<Chunk>,
     executed: Vec<vk::CommandBuffer>,
 }
 
 impl Frame {
-    pub(crate) fn new(device: &Arc<Device>, arena: &Arena, index: u32) -> Result<Self, Fault> {
-        let mut pool = Pool::new(device, &format!("frame {index}"))?;
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        arena: &Arena,
+        (passes, settings): (&Passes, &RendererSettings),
+        index: u32,
+    ) -> Result<Self, Fault> {
+        let name = format!("frame {index}");
+        let mut pool = Pool::new(device, &name)?;
         let lane = |lane: usize| {
-            let pool = Pool::new(device, &format!("frame {index}, lane {lane}"))?;
+            let pool = Pool::new(device, &format!("{name}, lane {lane}"))?;
             Ok(Lane { pool, buffers: Vec::new(), fault: None })
         };
         Ok(Self {
-            fence: Fence::new(device, &format!("frame {index}"))?,
-            staging: arena.staging(device, &format!("frame {index}, staging"))?,
+            fence: Fence::new(device, &name)?,
+            staging: arena.staging(device, &format!("{name}, staging"))?,
+            rings: Rings::new(device, passes, settings, &name)?,
             primary: pool.buffer(vk::CommandBufferLevel::PRIMARY)?,
             sky: pool.buffer(vk::CommandBufferLevel::SECONDARY)?,
+            overlay: pool.buffer(vk::CommandBufferLevel::SECONDARY)?,
             pool,
             lanes: (0..LANES).map(lane).collect::<Result<_, Fault>>()?,
             chunks: Vec::new(),
@@ -84,43 +102,56 @@ impl Frame {
         })
     }
 
-    /// Records the secondaries, on this and other workers. The fence must have been waited for.
+    /// Writes the draws and records the secondaries, on this and other workers. The fence must
+    /// have been waited for. Returns how many secondaries and how many indirect commands there are.
     pub(crate) fn record_secondaries(
         &mut self,
         scene: &Scene<'_>,
         team: &Team<'_>,
-    ) -> Result<u32, DrawError> {
-        cut(scene.view, &mut self.chunks);
+    ) -> Result<(u32, u32), DrawError> {
+        cut(scene.lists, &mut self.chunks);
+        let mut first = 0;
+        for slots in scene.lists {
+            self.rings.write_draws((first, slots), scene.arena, team);
+            first += slots.len();
+        }
         self.pool.reset()?;
-        secondary(scene, self.sky, |device, buffer| draw_sky(scene, device, buffer))?;
+        let rings = &self.rings;
+        if scene.picture.backdrop == Backdrop::Sky {
+            secondary(scene, self.sky, |buffer| draw_sky(scene, rings, buffer))?;
+        }
+        if rings.overlay_corners > 0 {
+            secondary(scene, self.overlay, |buffer| draw_overlay(scene, rings, buffer))?;
+        }
         let chunks = &self.chunks;
         let a_lane = chunks.len().div_ceil(LANES).max(1);
         team.for_each_chunk(&mut self.lanes, 1, |first, lanes| {
             for (lane, index) in lanes.iter_mut().zip(first..) {
                 let begin = (index * a_lane).min(chunks.len());
                 let end = (begin + a_lane).min(chunks.len());
-                lane.fault = lane.record(scene, &chunks[begin..end]).err();
+                lane.fault = lane.record(scene, rings, &chunks[begin..end]).err();
             }
         });
         if let Some(fault) = self.lanes.iter_mut().find_map(|lane| lane.fault.take()) {
             return Err(fault.into());
         }
-        Ok(u32::try_from(chunks.len() + 1).expect("patches are counted in 32 bits"))
+        let others = usize::from(scene.picture.backdrop == Backdrop::Sky)
+            + usize::from(rings.overlay_corners > 0);
+        let count = |n: usize| u32::try_from(n).expect("patches are counted in 32 bits");
+        Ok((count(chunks.len() + others), count(chunks.len())))
     }
 
     /// Records the primary over the copies and the secondaries.
     pub(crate) fn record_primary(
         &mut self,
         scene: &Scene<'_>,
-        staged: &[vk::BufferCopy],
+        copies: &Copies,
     ) -> Result<vk::CommandBuffer, Fault> {
         let primary = self.primary;
         begin(scene.device, primary)?;
-        if !staged.is_empty() {
-            transfer::copies(scene.device, primary, (&self.staging, &scene.arena.vertices), staged);
-        }
+        copies.record(scene.device, primary, (&self.staging, scene.arena));
         let a_lane = self.chunks.len().div_ceil(LANES).max(1);
-        let farthest = scene.view.ranges.len().saturating_sub(1);
+        let farthest = scene.lists.len().saturating_sub(1);
         for range in (0..=farthest).rev() {
             self.executed.clear();
             let numbered = self.chunks.iter().enumerate();
@@ -128,12 +159,17 @@ impl Frame {
             let buffers = own.map(|(i, _)| self.lanes[i / a_lane].buffers[i % a_lane]);
             self.executed.extend(buffers);
             let first = range == farthest;
-            if first {
+            if first && scene.picture.backdrop == Backdrop::Sky {
                 self.executed.push(self.sky);
             }
-            let targets = scene.targets;
-            let pass = if first { &targets.first_pass } else { &targets.next_pass };
-            if !self.executed.is_empty() {
+            if range == 0 && self.rings.overlay_corners > 0 {
+                self.executed.push(self.overlay);
+            }
+            let passes = scene.range_passes;
+            let pass = if first { &passes.first } else { &passes.next };
+            // The first pass clears the picture, and the nearest one leaves the depth.
+            let kept = range == 0 && scene.settings.keep_depth;
+            if first || kept || !self.executed.is_empty() {
                 range_pass(scene, primary, pass, &self.executed);
             }
         }
@@ -143,26 +179,31 @@ impl Frame {
 }
 
 impl Lane {
-    fn record(&mut self, scene: &Scene<'_>, chunks: &[Chunk]) -> Result<(), Fault> {
+    fn record(&mut self, scene: &Scene<'_>, rings: &Rings, chunks: &[Chunk]) -> Result<(), Fault> {
+        if chunks.is_empty() {
+            return Ok(());
+        }
         self.pool.reset()?;
         while self.buffers.len() < chunks.len() {
             self.buffers.push(self.pool.buffer(vk::CommandBufferLevel::SECONDARY)?);
         }
-        for (chunk, &buffer) in chunks.iter().zip(&self.buffers) {
-            secondary(scene, buffer, |device, buffer| draw_chunk(scene, device, buffer, *chunk))?;
+        for (&chunk, &buffer) in chunks.iter().zip(&self.buffers) {
+            secondary(scene, buffer, |buffer| draw_chunk(scene, rings, buffer, chunk))?;
         }
         Ok(())
     }
 }
 
 /// Cuts the lists of all ranges into chunks: by their lengths, never by the number of workers.
-fn cut(view: &ViewDraws, chunks: &mut Vec<Chunk>) {
+fn cut(lists: &[&[u32]], chunks: &mut Vec<Chunk>) {
     chunks.clear();
-    for (range, draws) in view.ranges.iter().enumerate() {
-        for first in (0..draws.patches.len()).step_by(CHUNK_PATCHES) {
-            let end = (first + CHUNK_PATCHES).min(draws.patches.len());
-            chunks.push(Chunk { range, first, end });
+    let mut start = 0;
+    for (range, slots) in lists.iter().enumerate() {
+        for first in (0..slots.len()).step_by(CHUNK_PATCHES) {
+            let rows = CHUNK_PATCHES.min(slots.len() - first);
+            chunks.push(Chunk { range, first_row: start + first, rows });
         }
+        start += slots.len();
     }
 }
 
@@ -170,54 +211,105 @@ fn cut(view: &ViewDraws, chunks: &mut Vec<Chunk>) {
 fn secondary(
     scene: &Scene<'_>,
     buffer: vk::CommandBuffer,
-    draw: impl FnOnce(&ash::Device, vk::CommandBuffer),
+    draw: impl FnOnce(vk::CommandBuffer),
 ) -> Result<(), Fault> {
     let inherited = vk::CommandBufferInheritanceInfo::default()
-        .render_pass(scene.targets.first_pass.handle)
+        .render_pass(scene.range_passes.first.handle)
         .framebuffer(scene.targets.framebuffer.handle);
     let flags = vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT
         | vk::CommandBufferUsageFlags::RENDER_PASS_CONTINUE;
     let info = vk::CommandBufferBeginInfo::default().flags(flags).inheritance_info(&inherited);
+    let area = scene.targets.area();
+    let [width, height] =
+        scene.targets.size_px.map(|n| overfly_core::geodesy::narrow(f64::from(n)));
+    let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
+    let device = &scene.device.handle;
     // SAFETY: the buffer's pool was reset and is used by this thread only: a lane's is behind the
     // lane's `&mut`, the frame's behind the frame's.
-    unsafe { scene.device.handle.begin_command_buffer(buffer, &info) }
-        .map_err(failed("vkBeginCommandBuffer"))?;
-    draw(&scene.device.handle, buffer);
+    unsafe {
+        device.begin_command_buffer(buffer, &info).map_err(failed("vkBeginCommandBuffer"))?;
+        device.cmd_set_viewport(buffer, 0, &[viewport]);
+        device.cmd_set_scissor(buffer, 0, &[area]);
+    }
+    draw(buffer);
     end(scene.device, buffer)
 }
 
-fn draw_sky(scene: &Scene<'_>, device: &ash::Device, buffer: vk::CommandBuffer) {
+/// Binds a pipeline with the view, and the terms of a range.
+fn bind(
+    scene: &Scene<'_>,
+    rings: &Rings,
+    (buffer, range): (vk::CommandBuffer, usize),
+    pipeline: vk::Pipeline,
+) {
     let graphics = vk::PipelineBindPoint::GRAPHICS;
-    let terms = bytes_of(&scene.terms.0);
+    let (device, layout) = (&scene.device.handle, scene.passes.layout.handle);
+    let order = scene.settings.depth_order;
+    let [near_m, far_m] = scene
+        .picture
+        .view
+        .ranges
+        .get(range)
+        .map_or([1.0, f64::INFINITY], |range| [range.near_m, range.far_m]);
+    let terms = RangeTerms::new(order, [near_m, far_m], range);
+    let view = [rings.view_set.handle];
     // SAFETY: the buffer is being recorded inside a compatible pass; the pipeline has this layout,
-    // whose push range is the terms' size, and needs no vertex buffer.
+    // whose push range is the terms' size and whose set 0 is the view's; set 1 is bound for the
+    // pipelines that read it.
     unsafe {
-        device.cmd_bind_pipeline(buffer, graphics, scene.passes.sky.handle);
-        device.cmd_push_constants(buffer, scene.passes.layout.handle, VIEW_STAGES, 0, terms);
-        device.cmd_draw(buffer, 3, 1, 0, 0);
+        device.cmd_bind_pipeline(buffer, graphics, pipeline);
+        device.cmd_bind_descriptor_sets(buffer, graphics, layout, 0, &view, &[]);
+        if let Some(infos) = rings.infos_set() {
+            device.cmd_bind_descriptor_sets(buffer, graphics, layout, 1, &[infos.handle], &[]);
+        }
+        device.cmd_push_constants(buffer, layout, VIEW_STAGES, 0, bytes_of(&[terms]));
     }
 }
 
-fn draw_chunk(scene: &Scene<'_>, device: &ash::Device, buffer: vk::CommandBuffer, chunk: Chunk) {
-    let (arena, passes) = (scene.arena, scene.passes);
-    let range = &scene.view.ranges[chunk.range];
-    let terms = scene.terms.in_range(range.near_m, range.far_m);
-    let graphics = vk::PipelineBindPoint::GRAPHICS;
-    // SAFETY: the buffer is being recorded inside a compatible pass; the pipeline has this layout,
-    // whose push range is the terms' size; both buffers live as long as the renderer.
+fn draw_sky(scene: &Scene<'_>, rings: &Rings, buffer: vk::CommandBuffer) {
+    let farthest = scene.lists.len().saturating_sub(1);
+    bind(scene, rings, (buffer, farthest), scene.passes.sky.handle);
+    // SAFETY: the pipeline bound above needs no vertex buffer.
+    unsafe { scene.device.handle.cmd_draw(buffer, 3, 1, 0, 0) };
+}
+
+fn draw_overlay(scene: &Scene<'_>, rings: &Rings, buffer: vk::CommandBuffer) {
+    let pipeline = scene.passes.overlay.as_ref().expect("made before it is recorded");
+    let corners = rings.overlay.as_ref().expect("made with its corners").handle;
+    bind(scene, rings, (buffer, 0), pipeline.handle);
+    // SAFETY: the buffer holds as many corners as were written.
     unsafe {
-        device.cmd_bind_pipeline(buffer, graphics, passes.terrain.handle);
-        device.cmd_bind_vertex_buffers(buffer, 0, &[arena.vertices.handle], &[0]);
-        device.cmd_bind_index_buffer(buffer, arena.indices.handle, 0, vk::IndexType::UINT16);
-        let bytes = bytes_of(&terms.0);
-        device.cmd_push_constants(buffer, passes.layout.handle, VIEW_STAGES, 0, bytes);
+        scene.device.handle.cmd_bind_vertex_buffers(buffer, 0, &[corners], &[0]);
+        scene.device.handle.cmd_draw(buffer, rings.overlay_corners, 1, 0, 0);
     }
-    for &slot in &range.patches[chunk.first..chunk.end] {
-        let first = i32::try_from(slot * arena.vertices_per_patch)
-            .expect("the settings' check bounds the arena's vertices");
-        // SAFETY: the renderer checked that the slot is below `patches_max`, so its vertices are
-        // inside the vertex buffer; the indices are those of one patch.
-        unsafe { device.cmd_draw_indexed(buffer, arena.indices_per_patch, 1, 0, first, 0) };
+}
+
+fn draw_chunk(scene: &Scene<'_>, rings: &Rings, buffer: vk::CommandBuffer, chunk: Chunk) {
+    let (arena, passes) = (scene.arena, scene.passes);
+    let pipeline = if scene.picture.show == Show::Shaded {
+        &passes.terrain
+    } else {
+        passes.debug.as_ref().expect("made before it is recorded")
+    };
+    bind(scene, rings, (buffer, chunk.range), pipeline.handle);
+    let row = size_of::<vk::DrawIndexedIndirectCommand>();
+    let stride = u32::try_from(row).expect("a row is 20 bytes");
+    let rows = u32::try_from(chunk.rows).expect("at most CHUNK_PATCHES");
+    let device = &scene.device.handle;
+    let vertices = [(VERTICES, Some(&arena.vertices)), (MORPHS, arena.morphs.as_ref())];
+    let places = [(PLACES, rings.places.as_ref())];
+    // SAFETY: the vertex buffers that the pipeline reads are bound and live as long as the
+    // renderer; the rows were written from slots that the renderer checked to be below
+    // `patches_max`, so their vertices are inside the buffers; the indices are those of one patch.
+    unsafe {
+        for (binding, vertices) in vertices.into_iter().chain(places) {
+            if let Some(vertices) = vertices {
+                device.cmd_bind_vertex_buffers(buffer, binding, &[vertices.handle], &[0]);
+            }
+        }
+        device.cmd_bind_index_buffer(buffer, arena.indices.handle, 0, vk::IndexType::UINT16);
+        let at = (chunk.first_row * row) as u64;
+        device.cmd_draw_indexed_indirect(buffer, rings.draws.handle, at, rows, stride);
     }
 }
 
@@ -227,10 +319,18 @@ fn range_pass(
     pass: &RenderPass,
     secondaries: &[vk::CommandBuffer],
 ) {
-    // Colour is cleared to black and depth to far; passes that load colour ignore the first.
+    let [r, g, b] = match scene.picture.backdrop {
+        Backdrop::Sky => [0.0; 3],
+        Backdrop::Colour(colour) => colour,
+    };
+    let depth = match scene.settings.depth_order {
+        DepthOrder::Reversed => 0.0,
+        DepthOrder::Forward => 1.0,
+    };
+    // Passes that load colour ignore the first.
     let clear = [
-        vk::ClearValue { color: vk::ClearColorValue { float32: [0.0, 0.0, 0.0, 1.0] } },
-        vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } },
+        vk::ClearValue { color: vk::ClearColorValue { float32: [r, g, b, 1.0] } },
+        vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil: 0 } },
     ];
     let info = vk::RenderPassBeginInfo::default()
         .render_pass(pass.handle)
@@ -244,7 +344,9 @@ fn range_pass(
     // and each is executed once.
     unsafe {
         device.cmd_begin_render_pass(primary, &info, contents);
-        device.cmd_execute_commands(primary, secondaries);
+        if !secondaries.is_empty() {
+            device.cmd_execute_commands(primary, secondaries);
+        }
         device.cmd_end_render_pass(primary);
     }
 }
@@ -252,30 +354,13 @@ fn range_pass(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use overfly_core::camera::{Camera, View};
-    use overfly_core::frame::data::RangeDraws;
-    use overfly_core::geodesy::{Ecef, Ellipsoid};
-    use overfly_core::units::Radians;
 
     #[test]
     fn chunks_follow_from_the_lists_alone() {
-        let view = View {
-            eye: Ecef(glam::DVec3::X * 7e6),
-            orientation: glam::DQuat::IDENTITY,
-            field_of_view: Radians(1.0),
-            size_px: [64, 64],
-            near_m: 1.0,
-        };
-        let range = |patches: u32| RangeDraws {
-            near_m: 1.0,
-            far_m: f64::INFINITY,
-            patches: (0..patches).collect(),
-        };
-        let camera = Camera::new(&view, &Ellipsoid::WGS84);
-        let draws = ViewDraws { camera, ranges: vec![range(0), range(256), range(300)] };
+        let all: Vec<u32> = (0..20_000).collect();
         let mut chunks = Vec::new();
-        cut(&draws, &mut chunks);
-        let list: Vec<_> = chunks.iter().map(|c| (c.range, c.first, c.end)).collect();
-        assert_eq!(list, [(1, 0, 256), (2, 0, 256), (2, 256, 300)]);
+        cut(&[&[], &all[..16_384], &all], &mut chunks);
+        let list: Vec<_> = chunks.iter().map(|c| (c.range, c.first_row, c.rows)).collect();
+        assert_eq!(list, [(1, 0, 16_384), (2, 16_384, 16_384), (2, 32_768, 3616)]);
     }
 }

@@ -9,8 +9,8 @@ use crate::error::StartError;
 
 use crate::shaders;
 use crate::vk::buffer::{Buffer, BufferInfo, bytes_of};
+use crate::vk::descriptors::{Binding, Resource, Set, SetLayout};
 use crate::vk::pipeline::{Layout, Pipeline};
-use crate::vk::storage::StorageSet;
 use crate::vk::{Device, commands::OneOff, transfer};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -39,8 +39,10 @@ pub(crate) fn run(device: &Arc<Device>, one_off: &mut OneOff) -> Result<(), Star
     };
     let mut buffer = Buffer::new(device, &info)?;
     buffer.mapped_mut().copy_from_slice(bytes);
-    let set = StorageSet::new(device, &buffer)?;
-    let layouts = [set.layout];
+    let (kind, stages) = (vk::DescriptorType::STORAGE_BUFFER, vk::ShaderStageFlags::COMPUTE);
+    let set_layout = SetLayout::new(device, "self-test", &[Binding { kind, stages }])?;
+    let set = Set::new(&set_layout, &[Resource::Buffer(&buffer)])?;
+    let layouts = [set_layout.handle];
     let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
     let layout = Layout::new(device, "self-test", &layout_info)?;
     let pipeline = Pipeline::compute(device, &layout, "self-test", &shaders::self_test())?;

@@ -5,19 +5,51 @@
 //! Keeps: nothing.
 //! Not here: pipelines (`passes`).
 
-/// Ground: `vertex`, `fragment`.
+use overfly_core::settings::VertexPrecision;
+
+macro_rules! module {
+    ($name:literal) => {
+        words(include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")))
+    };
+}
+
+/// Ground, `vertex`: how vertices are placed, whether they move, and whether for a debug view.
+pub(crate) fn ground(placed: VertexPrecision, morphs: bool, debug: bool) -> Vec<u32> {
+    match (placed, morphs, debug) {
+        (VertexPrecision::TwoFloat, false, false) => module!("ground_two_float"),
+        (VertexPrecision::TwoFloat, true, false) => module!("ground_two_float_morph"),
+        (VertexPrecision::TwoFloat, false, true) => module!("ground_two_float_debug"),
+        (VertexPrecision::TwoFloat, true, true) => module!("ground_two_float_morph_debug"),
+        (VertexPrecision::EyeF64, false, false) => module!("ground_eye"),
+        (VertexPrecision::EyeF64, true, false) => module!("ground_eye_morph"),
+        (VertexPrecision::EyeF64, false, true) => module!("ground_eye_debug"),
+        (VertexPrecision::EyeF64, true, true) => module!("ground_eye_morph_debug"),
+    }
+}
+
+/// Ground as one sees it: `fragment`.
 pub(crate) fn terrain() -> Vec<u32> {
-    words(include_bytes!(concat!(env!("OUT_DIR"), "/terrain.spv")))
+    module!("terrain")
+}
+
+/// Ground in debug views: `fragment`.
+pub(crate) fn debug() -> Vec<u32> {
+    module!("debug")
 }
 
 /// Sky: `vertex`, `fragment`.
 pub(crate) fn sky() -> Vec<u32> {
-    words(include_bytes!(concat!(env!("OUT_DIR"), "/sky.spv")))
+    module!("sky")
+}
+
+/// Overlay: `vertex`, `fragment`.
+pub(crate) fn overlay() -> Vec<u32> {
+    module!("overlay")
 }
 
 /// The two-sum on its own: `main`.
 pub(crate) fn self_test() -> Vec<u32> {
-    words(include_bytes!(concat!(env!("OUT_DIR"), "/self_test.spv")))
+    module!("self_test")
 }
 
 fn words(bytes: &[u8]) -> Vec<u32> {
@@ -50,7 +82,15 @@ mod tests {
 
     #[test]
     fn every_float_result_of_every_shader_is_decorated_once() {
-        for (module, least) in [(terrain(), 100), (sky(), 50), (self_test(), 8)] {
+        use VertexPrecision::{EyeF64, TwoFloat};
+        let placed = |placed, least| {
+            let all = [(false, false), (false, true), (true, false), (true, true)];
+            all.map(|(morphs, debug)| (ground(placed, morphs, debug), least))
+        };
+        let others =
+            [(terrain(), 100), (debug(), 30), (sky(), 50), (overlay(), 5), (self_test(), 8)];
+        let all = [&placed(TwoFloat, 20)[..], &placed(EyeF64, 10), &others].concat();
+        for (module, least) in all {
             let (results, decorated) = float_results_and_decorated(&module);
             assert!(results.len() >= least, "only {} float operations", results.len());
             assert_eq!(results, decorated);

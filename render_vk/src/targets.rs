@@ -1,40 +1,78 @@
 //! What is drawn into: colour and depth, and the render passes over them.
 //!
-//! In:    the picture's size.
-//! Out:   [`Targets`].
-//! Keeps: two images, two passes, a framebuffer, a buffer to read pixels from.
+//! In:    depth format, the picture's size.
+//! Out:   [`RangePasses`], [`Targets`].
+//! Keeps: two passes; two images, a framebuffer, a buffer to read pixels from.
 //! Not here: what is drawn (`passes`).
 //!
 //! Depth ranges share the images: each range is one instance of a render pass, the first clears
 //! colour and depth, later ones depth only. Classic render passes, because the validation layer of
 //! stable distributions finds no attachment hazards with dynamic rendering.
 
-use crate::error::Fault;
+use crate::error::{Fault, StartError};
 use crate::vk::image::{Image, ImageInfo};
 use crate::vk::pipeline::{Framebuffer, RenderPass};
 use crate::vk::{Buffer, Device, buffer::BufferInfo};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
+use overfly_core::settings::DepthFormat;
 use std::sync::Arc;
 
 /// Stores linear light with the sRGB curve; every device can draw to it.
 const COLOUR: vk::Format = vk::Format::R8G8B8A8_SRGB;
-/// Reversed: 1 near, 0 far. Resolves 4e-7 of the distance, from 0.1 m to 10 000 km.
-const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// The images of a renderer and the passes over them.
+/// The render passes of a renderer, whatever the size of its pictures.
+pub(crate) struct RangePasses {
+    pub(crate) first: RenderPass,
+    pub(crate) next: RenderPass,
+    depth: vk::Format,
+    keep_depth: bool,
+}
+
+impl RangePasses {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        format: DepthFormat,
+        keep_depth: bool,
+    ) -> Result<Self, StartError> {
+        let depth = depth_format(device, format)?;
+        let first = pass(device, ("first range", true), depth, keep_depth)?;
+        let next = pass(device, ("next range", false), depth, keep_depth)?;
+        Ok(Self { first, next, depth, keep_depth })
+    }
+}
+
+/// The device's format for depth: 24 bits come with or without eight that nobody uses.
+fn depth_format(device: &Device, format: DepthFormat) -> Result<vk::Format, StartError> {
+    let (name, candidates): (_, &[vk::Format]) = match format {
+        DepthFormat::D32F => ("D32F", &[vk::Format::D32_SFLOAT]),
+        DepthFormat::D24 => {
+            ("D24", &[vk::Format::X8_D24_UNORM_PACK32, vk::Format::D24_UNORM_S8_UINT])
+        }
+    };
+    let able = |format: &&vk::Format| {
+        let features = device.image_features(**format);
+        features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT)
+    };
+    let found = candidates.iter().find(able);
+    found.copied().ok_or(StartError::NoDepthFormat { format: name })
+}
+
+/// The images of pictures of one size.
 pub(crate) struct Targets {
     pub(crate) size_px: [u32; 2],
-    pub(crate) first_pass: RenderPass,
-    pub(crate) next_pass: RenderPass,
     pub(crate) framebuffer: Framebuffer,
     pub(crate) colour: Image,
     pub(crate) pixels: Buffer,
-    _depth: Image,
+    pub(crate) depth: Image,
 }
 
 impl Targets {
-    pub(crate) fn new(device: &Arc<Device>, size_px: [u32; 2]) -> Result<Self, Fault> {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        passes: &RangePasses,
+        size_px: [u32; 2],
+    ) -> Result<Self, Fault> {
         let image = |name, format, usage, aspect| {
             Image::new(device, &ImageInfo { name, size_px, format, usage, aspect })
         };
@@ -44,16 +82,24 @@ impl Targets {
             vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
             vk::ImageAspectFlags::COLOR,
         )?;
+        let read = if passes.keep_depth {
+            vk::ImageUsageFlags::TRANSFER_SRC
+        } else {
+            vk::ImageUsageFlags::empty()
+        };
+        let stencil = if passes.depth == vk::Format::D24_UNORM_S8_UINT {
+            vk::ImageAspectFlags::STENCIL
+        } else {
+            vk::ImageAspectFlags::empty()
+        };
         let depth = image(
             "depth",
-            DEPTH,
-            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-            vk::ImageAspectFlags::DEPTH,
+            passes.depth,
+            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | read,
+            vk::ImageAspectFlags::DEPTH | stencil,
         )?;
-        let first_pass = pass(device, "first range", true)?;
-        let next_pass = pass(device, "next range", false)?;
         let views = [colour.view, depth.view];
-        let framebuffer = Framebuffer::new(device, &first_pass, &views, size_px)?;
+        let framebuffer = Framebuffer::new(device, &passes.first, &views, size_px)?;
         let pixels = Buffer::new(
             device,
             &BufferInfo {
@@ -63,8 +109,7 @@ impl Targets {
                 location: MemoryLocation::GpuToCpu,
             },
         )?;
-        let _depth = depth;
-        Ok(Self { size_px, first_pass, next_pass, framebuffer, colour, pixels, _depth })
+        Ok(Self { size_px, framebuffer, colour, pixels, depth })
     }
 
     /// All of the picture.
@@ -76,7 +121,14 @@ impl Targets {
 
 /// A pass that clears depth, and colour too if it is the `first` of a picture. Both are
 /// compatible: they differ in what they load only.
-fn pass(device: &Arc<Device>, name: &str, first: bool) -> Result<RenderPass, Fault> {
+fn pass(
+    device: &Arc<Device>,
+    (name, first): (&str, bool),
+    depth: vk::Format,
+    keep_depth: bool,
+) -> Result<RenderPass, Fault> {
+    let kept =
+        if keep_depth { vk::AttachmentStoreOp::STORE } else { vk::AttachmentStoreOp::DONT_CARE };
     let drawn = vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL;
     let colour = vk::AttachmentDescription::default()
         .format(COLOUR)
@@ -88,10 +140,10 @@ fn pass(device: &Arc<Device>, name: &str, first: bool) -> Result<RenderPass, Fau
         .initial_layout(if first { vk::ImageLayout::UNDEFINED } else { drawn })
         .final_layout(drawn);
     let depth = vk::AttachmentDescription::default()
-        .format(DEPTH)
+        .format(depth)
         .samples(vk::SampleCountFlags::TYPE_1)
         .load_op(vk::AttachmentLoadOp::CLEAR)
-        .store_op(vk::AttachmentStoreOp::DONT_CARE)
+        .store_op(kept)
         .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
         .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
         .initial_layout(vk::ImageLayout::UNDEFINED)

@@ -2,15 +2,16 @@
 //!
 //! In:    slots built by the frame, the patch arena of core.
 //! Out:   staged vertices and the copies that bring them to the device.
-//! Keeps: vertex and index buffer, one bit a slot.
+//! Keeps: buffers of vertices, morphs and indices, one bit a slot.
 //! Not here: recording the copies (`record`).
 
 use crate::error::Fault;
+use crate::settings::RendererSettings;
 use crate::vk::buffer::{Buffer, BufferInfo, bytes_of};
-use crate::vk::{Device, commands::OneOff};
+use crate::vk::{Device, commands::OneOff, transfer};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use overfly_core::mesh::{PatchVertex, Patches, topology};
+use overfly_core::mesh::{PatchMorph, PatchVertex, Patches, topology};
 use std::sync::Arc;
 
 /// Vertices staged at once; a frame that has more to upload waits in between.
@@ -19,11 +20,42 @@ const STAGING_BYTES: u64 = 4 << 20;
 /// Vertices of all patches, as the device has them.
 pub(crate) struct Arena {
     pub(crate) vertices: Buffer,
+    /// Where vertices begin; only where the scene morphs.
+    pub(crate) morphs: Option<Buffer>,
     pub(crate) indices: Buffer,
     pub(crate) indices_per_patch: u32,
     pub(crate) vertices_per_patch: u32,
     /// Bit s % 64 of word s / 64: what the device has of slot s is out of date.
     stale: Vec<u64>,
+}
+
+/// Copies from one staging buffer to the arena.
+#[derive(Default)]
+pub(crate) struct Copies {
+    pub(crate) vertices: Vec<vk::BufferCopy>,
+    pub(crate) morphs: Vec<vk::BufferCopy>,
+}
+
+impl Copies {
+    fn clear(&mut self) {
+        self.vertices.clear();
+        self.morphs.clear();
+    }
+
+    /// Records them.
+    pub(crate) fn record(
+        &self,
+        device: &Device,
+        buffer: vk::CommandBuffer,
+        (staging, arena): (&Buffer, &Arena),
+    ) {
+        let morphs = arena.morphs.as_ref().map(|morphs| (morphs, &self.morphs));
+        for (to, regions) in [(&arena.vertices, &self.vertices)].into_iter().chain(morphs) {
+            if !regions.is_empty() {
+                transfer::copies(device, buffer, (staging, to), regions);
+            }
+        }
+    }
 }
 
 /// What one staging buffer took.
@@ -40,27 +72,29 @@ impl Arena {
     pub(crate) fn new(
         device: &Arc<Device>,
         one_off: &mut OneOff,
-        patch_depth: u8,
-        patches_max: u32,
+        settings: &RendererSettings,
     ) -> Result<Self, Fault> {
-        let segments = topology::segments(patch_depth);
-        let vertices_per_patch = (segments + 1) * (segments + 2) / 2;
+        let (patch_depth, patches_max) = (settings.patch_depth, settings.patches_max);
+        let vertices_per_patch = settings.vertices_per_patch();
         let pattern: Vec<u16> = topology::indices(patch_depth)
             .into_iter()
             .map(|i| u16::try_from(i).expect("a patch has at most 153 vertices"))
             .collect();
-        let vertices = Buffer::new(
-            device,
-            &BufferInfo {
-                name: "patch vertices",
-                bytes: u64::from(patches_max) * patch_bytes(vertices_per_patch),
+        let column = |name, row: usize| {
+            let info = BufferInfo {
+                name,
+                bytes: u64::from(patches_max) * u64::from(vertices_per_patch) * row as u64,
                 usage: vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
                 location: MemoryLocation::GpuOnly,
-            },
-        )?;
+            };
+            Buffer::new(device, &info)
+        };
+        let vertices = column("patch vertices", size_of::<PatchVertex>())?;
+        let morphs = settings.morphs().then(|| column("patch morphs", size_of::<PatchMorph>()));
         let indices = index_buffer(device, one_off, &pattern)?;
         Ok(Self {
             vertices,
+            morphs: morphs.transpose()?,
             indices,
             indices_per_patch: 3 << patch_depth,
             vertices_per_patch,
@@ -68,16 +102,24 @@ impl Arena {
         })
     }
 
-    /// A buffer to stage vertices in; holds at least one patch.
+    /// A buffer to stage patches in; holds at least one.
     pub(crate) fn staging(&self, device: &Arc<Device>, name: &str) -> Result<Buffer, Fault> {
-        let patch = patch_bytes(self.vertices_per_patch);
+        let patch: u64 = self.patch_bytes().iter().sum();
+        let all = self.vertices.bytes + self.morphs.as_ref().map_or(0, |morphs| morphs.bytes);
         let info = BufferInfo {
             name,
-            bytes: STAGING_BYTES.min(self.vertices.bytes) / patch * patch,
+            bytes: (STAGING_BYTES.min(all) / patch).max(1) * patch,
             usage: vk::BufferUsageFlags::TRANSFER_SRC,
             location: MemoryLocation::CpuToGpu,
         };
         Buffer::new(device, &info)
+    }
+
+    /// Bytes of one patch's vertices, and of its morphs.
+    fn patch_bytes(&self) -> [u64; 2] {
+        let vertices = u64::from(self.vertices_per_patch);
+        let morph = if self.morphs.is_some() { size_of::<PatchMorph>() } else { 0 };
+        [vertices * size_of::<PatchVertex>() as u64, vertices * morph as u64]
     }
 
     /// The device's copies of these slots are out of date. Slots beyond the arena are ignored.
@@ -95,29 +137,39 @@ impl Arena {
     }
 
     /// Stages live slots that are out of date, in order of slot, until the buffer is full. They
-    /// count as up to date from now on: `copies` must be executed.
+    /// count as up to date from now on: `copies` must be executed. Vertices are staged from the
+    /// buffer's beginning on, morphs in its last part.
     pub(crate) fn stage(
         &mut self,
         patches: &Patches,
         staging: &mut Buffer,
-        copies: &mut Vec<vk::BufferCopy>,
+        copies: &mut Copies,
     ) -> Staged {
         copies.clear();
         let mut staged = Staged::default();
-        let patch = patch_bytes(self.vertices_per_patch);
-        let (room, bytes) = (staging.bytes, staging.mapped_mut());
+        let [vertices, morphs] = self.patch_bytes();
+        let room = staging.bytes / (vertices + morphs);
+        let bytes = staging.mapped_mut();
+        let mut put = |at: u64, from: &[u8]| {
+            let at = usize::try_from(at).expect("staging is mapped, so it fits");
+            bytes[at..][..from.len()].copy_from_slice(from);
+        };
         let mut next = 0;
         while let Some(slot) = self.out_of_date(next, patches) {
-            if staged.bytes == room {
+            let at = u64::from(staged.patches);
+            if at == room {
                 staged.more = true;
                 break;
             }
             self.stale[slot as usize / 64] &= !(1 << (slot % 64));
-            let from = usize::try_from(staged.bytes).expect("staging is mapped, so it fits");
-            let vertices = bytes_of(patches.vertices_of(slot));
-            bytes[from..][..vertices.len()].copy_from_slice(vertices);
-            push_copy(copies, staged.bytes, u64::from(slot) * patch, patch);
-            staged.bytes += patch;
+            put(at * vertices, bytes_of(patches.vertices_of(slot)));
+            push_copy(&mut copies.vertices, at * vertices, u64::from(slot) * vertices, vertices);
+            if morphs > 0 {
+                let from = room * vertices + at * morphs;
+                put(from, bytes_of(morphs_of(patches, slot)));
+                push_copy(&mut copies.morphs, from, u64::from(slot) * morphs, morphs);
+            }
+            staged.bytes += vertices + morphs;
             staged.patches += 1;
             next = slot + 1;
         }
@@ -142,8 +194,10 @@ impl Arena {
     }
 }
 
-fn patch_bytes(vertices_per_patch: u32) -> u64 {
-    u64::from(vertices_per_patch) * size_of::<PatchVertex>() as u64
+/// The morphs of one slot.
+fn morphs_of(patches: &Patches, slot: u32) -> &[PatchMorph] {
+    let per_patch = patches.vertices_per_patch as usize;
+    &patches.morphs[slot as usize * per_patch..][..per_patch]
 }
 
 /// Adds a copy, or lengthens the last one where it goes on.
@@ -186,7 +240,7 @@ fn index_buffer(
     )?;
     let copy = [vk::BufferCopy { src_offset: 0, dst_offset: 0, size }];
     one_off.run(|device, buffer| {
-        crate::vk::transfer::copies(device, buffer, (&staging, &indices), &copy);
+        transfer::copies(device, buffer, (&staging, &indices), &copy);
     })?;
     Ok(indices)
 }

@@ -14,8 +14,9 @@ use overfly_core::camera::Camera;
 use overfly_core::frame::data::ViewDraws;
 use overfly_core::mesh::Patches;
 use overfly_core::scene::FrameParts;
+use overfly_core::settings::{DepthFormat, DepthOrder, VertexPrecision};
 use overfly_jobs::{Graph, Span, Team, Workers};
-use overfly_render_vk::{DrawError, Renderer, RendererSettings, StartError};
+use overfly_render_vk::{DrawError, Picture, Renderer, RendererSettings, StartError};
 use std::process::Command;
 use std::sync::Mutex;
 
@@ -34,6 +35,12 @@ fn settings(validation: bool) -> RendererSettings {
         patches_max: 8 << 8,
         size_px: SIZE_PX,
         ranges_max: 3,
+        depth_format: DepthFormat::D32F,
+        depth_order: DepthOrder::Reversed,
+        vertices: VertexPrecision::TwoFloat,
+        morph_s: 0.0,
+        tolerance_px: 1.0,
+        keep_depth: false,
         frames_in_flight: 2,
         validation,
     }
@@ -72,7 +79,7 @@ fn picture(
     parts: &FrameParts,
     team: &Team<'_>,
 ) -> Vec<u8> {
-    renderer.draw(view, patches, parts, team).unwrap();
+    renderer.draw(&Picture::of(&view, &patches, &parts), team).unwrap();
     renderer.read_pixels().unwrap()
 }
 
@@ -162,19 +169,22 @@ fn the_same_draws_give_the_same_bits_and_nothing_to_upload() {
     let view = planet::draws(low_camera(), &patches, &[1.0, 2e5]);
     let team = Team::alone();
     renderer.note_built(&(0..patches.used_end()).collect::<Vec<_>>());
-    let first = renderer.draw(&view, &patches, &earth(), &team).unwrap();
+    let first = renderer.draw(&Picture::of(&view, &patches, &earth()), &team).unwrap();
     let picture = renderer.read_pixels().unwrap();
     assert_eq!(first.uploaded_patches, 8 << 8);
     assert_eq!(first.uploaded_bytes, u64::from(first.uploaded_patches) * 15 * 36);
     assert_eq!((first.draws, first.triangles), (2 * (8 << 8), 2 * (8 << 12)));
-    assert_eq!(first.secondaries, 2 * 8 + 1);
+    assert_eq!((first.secondaries, first.commands), (2 + 1, 2));
     for _ in 0..3 {
-        let again = renderer.draw(&view, &patches, &earth(), &team).unwrap();
+        let again = renderer.draw(&Picture::of(&view, &patches, &earth()), &team).unwrap();
         assert_eq!((again.uploaded_patches, again.uploaded_bytes), (0, 0));
         assert!(renderer.read_pixels().unwrap() == picture);
     }
     renderer.note_built(&[7, 8, 2000, u32::MAX]);
-    assert_eq!(renderer.draw(&view, &patches, &earth(), &team).unwrap().uploaded_patches, 3);
+    assert_eq!(
+        renderer.draw(&Picture::of(&view, &patches, &earth()), &team).unwrap().uploaded_patches,
+        3
+    );
 }
 
 #[test]
@@ -188,7 +198,7 @@ fn more_patches_than_the_staging_buffer_holds_arrive_all() {
     let patches = planet::patches(5, 0.0);
     let view = planet::draws(far_camera(), &patches, &[1.0]);
     let team = Team::alone();
-    let report = renderer.draw(&view, &patches, &AIRLESS, &team).unwrap();
+    let report = renderer.draw(&Picture::of(&view, &patches, &AIRLESS), &team).unwrap();
     assert_eq!(report.uploaded_patches, 8 << 10);
     let first = renderer.read_pixels().unwrap();
     renderer.note_built(&(0..patches.used_end()).collect::<Vec<_>>());
@@ -233,7 +243,7 @@ fn draws_that_do_not_fit_the_renderer_are_refused_and_it_stays_usable() {
     let good = planet::draws(far_camera(), &patches, &[1.0]);
     let other_size = planet::camera(DVec3::X * 1e7, DVec3::ZERO, [64, 64], 40.0);
     let mut refused = |view: &ViewDraws, patches: &Patches| {
-        renderer.draw(view, patches, &AIRLESS, &team).unwrap_err().to_string()
+        renderer.draw(&Picture::of(&view, &patches, &AIRLESS), &team).unwrap_err().to_string()
     };
     let text = refused(&planet::draws(other_size, &patches, &[1.0]), &patches);
     assert_eq!(text, "the view is 64 x 64 pixels, the renderer's pictures are 480 x 320");
@@ -244,7 +254,7 @@ fn draws_that_do_not_fit_the_renderer_are_refused_and_it_stays_usable() {
     patches.give_back(5);
     assert_eq!(refused(&good, &patches), "the view draws slot 5, which holds no patch");
     patches.take(overfly_core::mesh::patches::Leaf { diamond: 5, side: 0 });
-    assert!(renderer.draw(&good, &patches, &AIRLESS, &team).is_ok());
+    assert!(renderer.draw(&Picture::of(&good, &patches, &AIRLESS), &team).is_ok());
 }
 
 #[test]
@@ -287,7 +297,7 @@ fn validation_finds_a_planted_hazard_and_nothing_else() {
     {
         let view = planet::draws(low_camera(), &patches, borders_m);
         renderer.note_built(&[frame, frame + 60, frame + 61]);
-        renderer.draw(&view, &patches, &earth(), &Team::alone()).unwrap();
+        renderer.draw(&Picture::of(&view, &patches, &earth()), &Team::alone()).unwrap();
         if frame % 2 == 1 {
             renderer.read_pixels().unwrap();
         }

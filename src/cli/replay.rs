@@ -302,14 +302,8 @@ fn add_renderer(
     size_px: [u32; 2],
     validation: bool,
 ) -> Result<bool, Failure> {
-    let settings = RendererSettings {
-        patch_depth: scene.lod.patch_depth,
-        patches_max: overfly.terrain().limits().leaves,
-        size_px,
-        ranges_max: u32::try_from(scene.depth.splits_m.len() + 1)?,
-        frames_in_flight: 2,
-        validation,
-    };
+    let limits = overfly.terrain().limits();
+    let settings = RendererSettings { validation, ..RendererSettings::of(scene, limits, size_px) };
     match Renderer::new(&settings) {
         Ok(renderer) => {
             say!("drawing on {}", renderer.device_line());

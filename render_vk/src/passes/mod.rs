@@ -1,43 +1,98 @@
 //! The pipelines that a picture is drawn with.
 //!
-//! In:    render passes, compiled shaders.
+//! In:    render passes, compiled shaders, settings.
 //! Out:   [`Passes`].
-//! Keeps: pipelines and their layout.
+//! Keeps: layouts; the pipelines of the plain picture, others once they were asked for.
 //! Not here: recording (`record`).
 
+mod overlay;
 mod sky;
-mod terrain;
+pub(crate) mod terrain;
 
 use crate::error::Fault;
-use crate::targets::Targets;
+use crate::matrices::RangeTerms;
+use crate::settings::RendererSettings;
+use crate::targets::RangePasses;
 use crate::vk::Device;
+use crate::vk::descriptors::{Binding, SetLayout};
 use crate::vk::pipeline::{Layout, Pipeline};
 use ash::vk;
+use overfly_core::settings::DepthOrder;
 use std::sync::Arc;
 
-/// Stages that read the view.
+/// Stages that read the view and the range.
 pub(crate) const VIEW_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
     vk::ShaderStageFlags::VERTEX.as_raw() | vk::ShaderStageFlags::FRAGMENT.as_raw(),
 );
 
-/// Size of the shaders' `View`.
-const VIEW_BYTES: u32 = 124;
-const _: () = assert!(size_of::<crate::matrices::ViewTerms>() == VIEW_BYTES as usize);
+/// Size of the shaders' `Range`.
+const RANGE_BYTES: u32 = 16;
+const _: () = assert!(size_of::<RangeTerms>() == RANGE_BYTES as usize);
 
-/// All pipelines. They share one layout: the view as push constants, no descriptors.
+/// What pipelines are made from.
+pub(crate) struct PassInfo<'a> {
+    pub(crate) device: &'a Arc<Device>,
+    pub(crate) passes: &'a RangePasses,
+    pub(crate) settings: &'a RendererSettings,
+}
+
+/// All pipelines. The range is push constants; set 0 is the view, set 1 what debug views show.
 pub(crate) struct Passes {
+    pub(crate) view: SetLayout,
+    pub(crate) infos: SetLayout,
     pub(crate) layout: Layout,
     pub(crate) terrain: Pipeline,
     pub(crate) sky: Pipeline,
+    pub(crate) debug: Option<Pipeline>,
+    pub(crate) overlay: Option<Pipeline>,
 }
 
 impl Passes {
-    pub(crate) fn new(device: &Arc<Device>, targets: &Targets) -> Result<Self, Fault> {
-        let ranges = [vk::PushConstantRange::default().stage_flags(VIEW_STAGES).size(VIEW_BYTES)];
-        let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
-        let layout = Layout::new(device, "view", &info)?;
-        let terrain = terrain::pipeline(device, &layout, targets)?;
-        let sky = sky::pipeline(device, &layout, targets)?;
-        Ok(Self { layout, terrain, sky })
+    /// The pipelines of a plain picture.
+    pub(crate) fn new(info: &PassInfo<'_>) -> Result<Self, Fault> {
+        let device = info.device;
+        let uniform = vk::DescriptorType::UNIFORM_BUFFER;
+        let storage = vk::DescriptorType::STORAGE_BUFFER;
+        let stages = vk::ShaderStageFlags::FRAGMENT;
+        let view = [Binding { kind: uniform, stages: VIEW_STAGES }];
+        let view = SetLayout::new(device, "view", &view)?;
+        let infos = SetLayout::new(device, "patch infos", &[Binding { kind: storage, stages }])?;
+        let ranges = [vk::PushConstantRange::default().stage_flags(VIEW_STAGES).size(RANGE_BYTES)];
+        let sets = [view.handle, infos.handle];
+        let create = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(&sets)
+            .push_constant_ranges(&ranges);
+        let layout = Layout::new(device, "picture", &create)?;
+        let terrain = terrain::pipeline(info, &layout, false)?;
+        let sky = sky::pipeline(info, &layout)?;
+        Ok(Self { view, infos, layout, terrain, sky, debug: None, overlay: None })
+    }
+
+    /// Makes what a picture needs beyond a plain one, the first time.
+    pub(crate) fn complete(
+        &mut self,
+        info: &PassInfo<'_>,
+        (debug, overlay): (bool, bool),
+    ) -> Result<(), Fault> {
+        if debug && self.debug.is_none() {
+            self.debug = Some(terrain::pipeline(info, &self.layout, true)?);
+        }
+        if overlay && self.overlay.is_none() {
+            self.overlay = Some(overlay::pipeline(info, &self.layout)?);
+        }
+        Ok(())
+    }
+
+    /// How many pipelines there are.
+    pub(crate) fn count(&self) -> u32 {
+        2 + u32::from(self.debug.is_some()) + u32::from(self.overlay.is_some())
+    }
+}
+
+/// The comparison that lets the nearer surface win.
+fn nearer(order: DepthOrder) -> vk::CompareOp {
+    match order {
+        DepthOrder::Reversed => vk::CompareOp::GREATER,
+        DepthOrder::Forward => vk::CompareOp::LESS,
     }
 }

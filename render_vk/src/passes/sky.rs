@@ -5,30 +5,29 @@
 //! Keeps: nothing.
 //! Not here: the air's arithmetic (`shaders/air.wgsl`).
 
+use super::{PassInfo, nearer};
 use crate::error::Fault;
 use crate::shaders;
-use crate::targets::Targets;
-use crate::vk::Device;
 use crate::vk::pipeline::{GraphicsInfo, Layout, Pipeline};
 use ash::vk;
-use std::sync::Arc;
 
-/// Drawn last in the farthest range, at depth 0: so only pixels without ground are shaded.
-pub(crate) fn pipeline(
-    device: &Arc<Device>,
-    layout: &Layout,
-    targets: &Targets,
-) -> Result<Pipeline, Fault> {
-    let info = GraphicsInfo {
+/// Drawn last in the farthest range, infinitely far: so only pixels without ground are shaded.
+pub(crate) fn pipeline(info: &PassInfo<'_>, layout: &Layout) -> Result<Pipeline, Fault> {
+    let words = shaders::sky();
+    let compare = match nearer(info.settings.depth_order) {
+        vk::CompareOp::GREATER => vk::CompareOp::GREATER_OR_EQUAL,
+        _ => vk::CompareOp::LESS_OR_EQUAL,
+    };
+    let graphics = GraphicsInfo {
         name: "sky",
-        words: &shaders::sky(),
-        pass: &targets.first_pass,
-        size_px: targets.size_px,
+        words: [&words, &words],
+        pass: &info.passes.first,
         bindings: &[],
         attributes: &[],
         cull: vk::CullModeFlags::NONE,
-        depth_compare: vk::CompareOp::GREATER_OR_EQUAL,
+        depth_compare: Some(compare),
         depth_write: false,
+        blend: false,
     };
-    Pipeline::graphics(device, layout, &info)
+    Pipeline::graphics(info.device, layout, &graphics)
 }

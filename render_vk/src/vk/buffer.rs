@@ -11,17 +11,33 @@ use crate::error::{Fault, failed};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
-use overfly_core::mesh::PatchVertex;
+use overfly_core::inspect::PatchInfo;
+use overfly_core::mesh::{PatchMorph, PatchVertex};
 use std::sync::Arc;
 
 /// Data that is uploaded as its bytes.
 ///
 /// # Safety
 /// - The type has no padding: every byte of a value is initialised.
+/// - Any bytes are a value of it.
 pub(crate) unsafe trait Plain: Copy {}
 
-// SAFETY: `repr(C)`, 24 + 4 + 4 + 4 + 4 bytes with alignment 4 make 40: no gap.
+// SAFETY: `repr(C)`, 24 + 4 + 4 + 4 bytes with alignment 4 make 36: no gap.
 unsafe impl Plain for PatchVertex {}
+// SAFETY: `repr(C)`, 12 + 4 + 4 + 4 bytes with alignment 4 make 24: no gap.
+unsafe impl Plain for PatchMorph {}
+// SAFETY: `repr(C)`, a float and four bytes: no gap.
+unsafe impl Plain for PatchInfo {}
+// SAFETY: `repr(C)`, floats and words of four bytes each.
+unsafe impl Plain for crate::matrices::ViewTerms {}
+// SAFETY: `repr(C)`, floats and words of four bytes each.
+unsafe impl Plain for crate::matrices::RangeTerms {}
+// SAFETY: `repr(C)`, two floats and four bytes.
+unsafe impl Plain for crate::overlay::OverlayVertex {}
+// SAFETY: `repr(C)`, five words of four bytes.
+unsafe impl Plain for vk::DrawIndexedIndirectCommand {}
+// SAFETY: floats have no padding, nor have arrays of them.
+unsafe impl Plain for [f32; 3] {}
 // SAFETY: integers and floats have no padding, nor have arrays of them.
 unsafe impl Plain for u16 {}
 // SAFETY: as above.
@@ -85,6 +101,19 @@ impl Buffer {
         let allocation = self.allocation.as_mut().expect("a made buffer has memory");
         let size = usize::try_from(self.bytes).expect("it is mapped, so it fits the address space");
         &mut allocation.mapped_slice_mut().expect("staging buffers are mapped")[..size]
+    }
+
+    /// The mapped bytes as rows to write, as many as fit whole.
+    ///
+    /// # Panics
+    /// As [`Buffer::mapped_mut`], or if the memory is not aligned for the rows.
+    pub(crate) fn rows_mut<T: Plain>(&mut self) -> &mut [T] {
+        let bytes = self.mapped_mut();
+        assert!(bytes.as_ptr().cast::<T>().is_aligned(), "Vulkan aligns mapped memory to 64 bytes");
+        let rows = bytes.len() / size_of::<T>();
+        // SAFETY: the bytes are `rows` rows long, aligned, borrowed for as long as the slice; any
+        // bytes are a value of the plain types, whose fields are integers and floats.
+        unsafe { core::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast(), rows) }
     }
 
     /// The mapped bytes to read, once the device has written them and its fence was waited for.

@@ -100,9 +100,25 @@ impl Fence {
 
     /// Submits one recorded primary buffer.
     pub(crate) fn submit(&mut self, buffer: vk::CommandBuffer) -> Result<(), Fault> {
+        self.submit_between(buffer, &[], &[])
+    }
+
+    /// Submits one recorded primary buffer, whose copies wait for one semaphore each of `after`,
+    /// and which signals those of `before`.
+    pub(crate) fn submit_between(
+        &mut self,
+        buffer: vk::CommandBuffer,
+        after: &[vk::Semaphore],
+        before: &[vk::Semaphore],
+    ) -> Result<(), Fault> {
         assert!(!self.pending, "a fence is waited for before it is used again");
         let buffers = [buffer];
-        let submits = [vk::SubmitInfo::default().command_buffers(&buffers)];
+        let stages = [vk::PipelineStageFlags::TRANSFER];
+        let submits = [vk::SubmitInfo::default()
+            .command_buffers(&buffers)
+            .wait_semaphores(after)
+            .wait_dst_stage_mask(&stages[..after.len()])
+            .signal_semaphores(before)];
         // SAFETY: the buffer is recorded and not pending, the fence is unsignalled and not in use,
         // and the queue is only reached through a `&mut Renderer`.
         unsafe { self.device.handle.queue_submit(self.device.queue, &submits, self.handle) }

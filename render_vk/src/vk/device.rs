@@ -5,10 +5,10 @@
 //! Keeps: device, queue, memory allocator, instance.
 //! Not here: other objects.
 
-use super::instance::Instance;
+use super::instance::{Instance, Surface, Window};
 use super::memory::Memory;
 use crate::error::{Fault, StartError, failed};
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use core::mem::ManuallyDrop;
 
 /// A device with one queue that draws, computes and copies.
@@ -20,22 +20,36 @@ pub(crate) struct Device {
     pub(crate) family: u32,
     pub(crate) limits: vk::PhysicalDeviceLimits,
     line: String,
+    physical: vk::PhysicalDevice,
     // Last: everything above is destroyed before the instance.
     instance: Instance,
 }
 
 impl Device {
     /// Opens the best device: discrete before integrated before virtual before software.
-    pub(crate) fn new(validation: bool) -> Result<Self, StartError> {
-        let instance = Instance::new(validation)?;
+    pub(crate) fn new(validation: bool, window: Option<Window>) -> Result<Self, StartError> {
+        let instance = Instance::new(validation, window)?;
         let (physical, family) = choose(&instance)?;
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(family)
             .queue_priorities(&priorities)];
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        // SAFETY: the physical device belongs to the instance.
+        let has = unsafe { instance.handle.get_physical_device_features(physical) };
+        if has.multi_draw_indirect == vk::FALSE {
+            return Err(StartError::NoFeature { feature: "multiDrawIndirect" });
+        }
+        let features = vk::PhysicalDeviceFeatures::default()
+            .multi_draw_indirect(true)
+            .sampler_anisotropy(has.sampler_anisotropy == vk::TRUE);
+        let swapchain = instance.surface.as_ref().map(|_| khr::swapchain::NAME.as_ptr());
+        let extensions: Vec<_> = swapchain.into_iter().collect();
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .enabled_features(&features);
         // SAFETY: the physical device belongs to the instance, the family exists with at least
-        // one queue, and no extension or feature is asked for.
+        // one queue, the device has the features, and the surface's own check found the extension.
         let handle = unsafe { instance.handle.create_device(physical, &info, None) }
             .map_err(failed("vkCreateDevice"))?;
         let memory = match Memory::new(&instance.handle, physical, &handle) {
@@ -54,7 +68,8 @@ impl Device {
         let line = format!("{}, {}, Vulkan {}", about.name, about.driver, about.api_version);
         let limits = instance.properties(physical).limits;
         let memory = ManuallyDrop::new(memory);
-        let device = Self { memory, names, handle, queue, family, limits, line, instance };
+        let device =
+            Self { memory, names, handle, queue, family, limits, line, physical, instance };
         device.name(device.queue, "queue");
         Ok(device)
     }
@@ -62,6 +77,24 @@ impl Device {
     /// Name, driver and API version.
     pub(crate) fn line(&self) -> &str {
         &self.line
+    }
+
+    /// Where pictures are presented, if there is a window.
+    pub(crate) fn surface(&self) -> Option<&Surface> {
+        self.instance.surface.as_ref()
+    }
+
+    /// The Vulkan functions that belong to the instance, and the physical device.
+    pub(crate) fn instance(&self) -> (&ash::Instance, vk::PhysicalDevice) {
+        (&self.instance.handle, self.physical)
+    }
+
+    /// What the device can do with optimally tiled images of a format.
+    pub(crate) fn image_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        let (instance, physical) = self.instance();
+        // SAFETY: the physical device belongs to the instance.
+        unsafe { instance.get_physical_device_format_properties(physical, format) }
+            .optimal_tiling_features
     }
 
     /// Messages of the validation layer so far.
@@ -109,7 +142,16 @@ fn family_of(instance: &Instance, physical: vk::PhysicalDevice) -> Option<u32> {
     // SAFETY: the device belongs to the instance, which is alive.
     let families = unsafe { instance.handle.get_physical_device_queue_family_properties(physical) };
     let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    (0..).zip(&families).find(|(_, f)| f.queue_flags.contains(both)).map(|(i, _)| i)
+    let mut able = (0..).zip(&families).filter(|(_, f)| f.queue_flags.contains(both));
+    able.find(|&(family, _)| presents(instance, physical, family)).map(|(family, _)| family)
+}
+
+/// Whether a family can present to the instance's surface; true without one.
+fn presents(instance: &Instance, physical: vk::PhysicalDevice, family: u32) -> bool {
+    let Some(Surface { functions, handle, .. }) = &instance.surface else { return true };
+    // SAFETY: device and surface belong to the instance, and the device has the family.
+    unsafe { functions.get_physical_device_surface_support(physical, family, *handle) }
+        .unwrap_or(false)
 }
 
 impl Drop for Device {

@@ -26,6 +26,7 @@ pub(crate) struct ImageInfo<'a> {
 pub(crate) struct Image {
     pub(crate) handle: vk::Image,
     pub(crate) view: vk::ImageView,
+    pub(crate) aspect: vk::ImageAspectFlags,
     allocation: Option<Allocation>,
     device: Arc<Device>,
 }
@@ -48,7 +49,8 @@ impl Image {
         let handle = unsafe { device.handle.create_image(&create, None) }
             .map_err(failed("vkCreateImage"))?;
         let view = vk::ImageView::null();
-        let mut image = Self { handle, view, allocation: None, device: Arc::clone(device) };
+        let (aspect, owner) = (info.aspect, Arc::clone(device));
+        let mut image = Self { handle, view, aspect, allocation: None, device: owner };
         device.name(handle, info.name);
         image.bind(info.name)?;
         image.look(info)?;

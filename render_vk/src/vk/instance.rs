@@ -1,8 +1,8 @@
 //! The Vulkan library, an instance, and what devices and layers it offers.
 //!
-//! In:    whether to validate.
+//! In:    whether to validate; a window, if there is one to draw to.
 //! Out:   [`Instance`]; lists of devices and layers.
-//! Keeps: the loaded library, the instance, the messenger.
+//! Keeps: the loaded library, the instance, the messenger, the window and its surface.
 //! Not here: the logical device (`device`).
 //!
 //! Validation includes synchronisation. Layers up to 1.3.2xx check hazards across command buffers
@@ -11,14 +11,32 @@
 
 use super::messages::Messenger;
 use crate::error::{StartError, failed};
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
+use core::any::Any;
 use core::ffi::{CStr, c_char};
+use raw_window_handle::{RawDisplayHandle, RawWindowHandle};
+use std::sync::Arc;
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// A window to draw to, and whoever keeps its handles good.
+pub(crate) struct Window {
+    pub(crate) display: RawDisplayHandle,
+    pub(crate) window: RawWindowHandle,
+    pub(crate) owner: Arc<dyn Any + Send + Sync>,
+}
+
+/// Where pictures are presented.
+pub(crate) struct Surface {
+    pub(crate) functions: khr::surface::Instance,
+    pub(crate) handle: vk::SurfaceKHR,
+    _window: Arc<dyn Any + Send + Sync>,
+}
 
 /// The library, loaded at run time, and an instance of it.
 pub(crate) struct Instance {
     messenger: Option<Messenger>,
+    pub(crate) surface: Option<Surface>,
     pub(crate) handle: ash::Instance,
     /// Whether objects can be named.
     pub(crate) has_names: bool,
@@ -80,12 +98,12 @@ pub fn layers() -> Result<Vec<String>, StartError> {
 /// # Errors
 /// [`StartError::NoLibrary`] without a Vulkan loader, [`StartError::NoDevice`] without a driver.
 pub fn devices() -> Result<Vec<DeviceInfo>, StartError> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(false, None)?;
     Ok(instance.physical_devices()?.into_iter().map(|d| instance.info(d)).collect())
 }
 
 impl Instance {
-    pub(crate) fn new(validation: bool) -> Result<Self, StartError> {
+    pub(crate) fn new(validation: bool, window: Option<Window>) -> Result<Self, StartError> {
         let (entry, version) = load()?;
         if version < vk::API_VERSION_1_1 {
             return Err(StartError::TooOld { found: version_text(version) });
@@ -98,12 +116,24 @@ impl Instance {
             .map_err(failed("vkEnumerateInstanceExtensionProperties"))?;
         let has_names =
             extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        let handle = create(&entry, version, validation, has_names)?;
-        let mut instance = Self { messenger: None, handle, has_names, version, _entry: entry };
+        let display = window.as_ref().map(|window| window.display);
+        let handle = create(&entry, version, (validation, has_names), display)?;
+        let (messenger, surface) = (None, None);
+        let mut instance = Self { messenger, surface, handle, has_names, version, _entry: entry };
         if validation && has_names {
             let messenger = Messenger::new(&instance._entry, &instance.handle)
                 .map_err(failed("vkCreateDebugUtilsMessengerEXT"))?;
             instance.messenger = Some(messenger);
+        }
+        if let Some(Window { display, window, owner }) = window {
+            let (entry, handle) = (&instance._entry, &instance.handle);
+            let functions = khr::surface::Instance::new(entry, handle);
+            // SAFETY: the instance has the display's extensions; `owner` keeps both handles good
+            // for as long as the surface, which the instance destroys first.
+            let surface =
+                unsafe { ash_window::create_surface(entry, handle, display, window, None) };
+            let surface = surface.map_err(failed("creating a surface"))?;
+            instance.surface = Some(Surface { functions, handle: surface, _window: owner });
         }
         Ok(instance)
     }
@@ -160,8 +190,8 @@ impl Instance {
 fn create(
     entry: &ash::Entry,
     version: u32,
-    validation: bool,
-    has_names: bool,
+    (validation, has_names): (bool, bool),
+    display: Option<RawDisplayHandle>,
 ) -> Result<ash::Instance, StartError> {
     let application = vk::ApplicationInfo::default()
         .application_name(c"overfly")
@@ -171,6 +201,11 @@ fn create(
     let mut layers: Vec<*const c_char> = Vec::new();
     if has_names {
         extensions.push(ext::debug_utils::NAME.as_ptr());
+    }
+    if let Some(display) = display {
+        let needed = ash_window::enumerate_required_extensions(display)
+            .map_err(|e| StartError::NoSurface { reason: e.to_string() })?;
+        extensions.extend_from_slice(needed);
     }
     if validation {
         layers.push(LAYER.as_ptr());
@@ -190,6 +225,9 @@ fn create(
     match unsafe { entry.create_instance(&info, None) } {
         Ok(instance) => Ok(instance),
         Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(StartError::NoDevice),
+        Err(vk::Result::ERROR_EXTENSION_NOT_PRESENT) if display.is_some() => {
+            Err(StartError::NoSurface { reason: "the driver knows no windows of this kind".into() })
+        }
         Err(result) => Err(failed("vkCreateInstance")(result).into()),
     }
 }
@@ -197,6 +235,11 @@ fn create(
 impl Drop for Instance {
     fn drop(&mut self) {
         self.messenger = None;
+        if let Some(surface) = self.surface.take() {
+            // SAFETY: made from this instance and destroyed once; swapchains keep the device and
+            // so the instance alive, so none is left.
+            unsafe { surface.functions.destroy_surface(surface.handle, None) };
+        }
         // SAFETY: everything made from the instance keeps it alive through `Device`, so nothing
         // is left of it now; the messenger went a line above.
         unsafe { self.handle.destroy_instance(None) };

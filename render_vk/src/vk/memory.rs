@@ -11,6 +11,7 @@ use gpu_allocator::vulkan::{
     Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
 };
 use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings, MemoryLocation};
+use overfly_core::frame::data::DeviceTotals;
 use parking_lot::Mutex;
 
 /// Size of a block: small, because a scene has few and known objects.
@@ -18,7 +19,12 @@ const BLOCK_BYTES: u64 = 8 << 20;
 
 /// All memory of one device.
 pub(crate) struct Memory {
-    allocator: Mutex<Allocator>,
+    held: Mutex<Held>,
+}
+
+struct Held {
+    allocator: Allocator,
+    totals: DeviceTotals,
 }
 
 /// What an allocation is for.
@@ -45,12 +51,13 @@ impl Memory {
             allocation_sizes: AllocationSizes::new(BLOCK_BYTES, BLOCK_BYTES),
         })
         .map_err(|e| fault("the allocator", 0, &e))?;
-        Ok(Self { allocator: Mutex::new(allocator) })
+        Ok(Self { held: Mutex::new(Held { allocator, totals: DeviceTotals::default() }) })
     }
 
     pub(crate) fn take(&self, want: &Want<'_>) -> Result<Allocation, Fault> {
-        self.allocator
-            .lock()
+        let mut held = self.held.lock();
+        let allocation = held
+            .allocator
             .allocate(&AllocationCreateDesc {
                 name: want.name,
                 requirements: want.requirements,
@@ -58,12 +65,23 @@ impl Memory {
                 linear: want.linear,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
-            .map_err(|e| fault(want.name, want.requirements.size, &e))
+            .map_err(|e| fault(want.name, want.requirements.size, &e))?;
+        held.totals.allocations += 1;
+        held.totals.bytes += allocation.size();
+        Ok(allocation)
+    }
+
+    /// What is taken now.
+    pub(crate) fn totals(&self) -> DeviceTotals {
+        self.held.lock().totals
     }
 
     pub(crate) fn give_back(&self, allocation: Allocation) {
         // Fails only for allocations of another allocator, and there is one.
-        let freed = self.allocator.lock().free(allocation);
+        let mut held = self.held.lock();
+        held.totals.allocations -= 1;
+        held.totals.bytes -= allocation.size();
+        let freed = held.allocator.free(allocation);
         debug_assert!(freed.is_ok());
     }
 }

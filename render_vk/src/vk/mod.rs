@@ -7,6 +7,7 @@
 
 pub(crate) mod buffer;
 pub(crate) mod commands;
+pub(crate) mod descriptors;
 pub(crate) mod device;
 pub(crate) mod image;
 pub(crate) mod instance;
@@ -14,7 +15,7 @@ pub(crate) mod memory;
 pub(crate) mod messages;
 pub(crate) mod names;
 pub(crate) mod pipeline;
-pub(crate) mod storage;
+pub(crate) mod swapchain;
 pub(crate) mod transfer;
 
 pub(crate) use buffer::Buffer;

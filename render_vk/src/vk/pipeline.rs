@@ -127,14 +127,17 @@ impl Drop for Shader {
 /// What differs between the graphics pipelines.
 pub(crate) struct GraphicsInfo<'a> {
     pub(crate) name: &'a str,
-    pub(crate) words: &'a [u32],
+    /// Modules of the entry points `vertex` and `fragment`.
+    pub(crate) words: [&'a [u32]; 2],
     pub(crate) pass: &'a RenderPass,
-    pub(crate) size_px: [u32; 2],
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
     pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
     pub(crate) cull: vk::CullModeFlags,
-    pub(crate) depth_compare: vk::CompareOp,
+    /// No test at all without a comparison.
+    pub(crate) depth_compare: Option<vk::CompareOp>,
     pub(crate) depth_write: bool,
+    /// Whether alpha is opacity.
+    pub(crate) blend: bool,
 }
 
 /// A pipeline.
@@ -144,37 +147,29 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    /// Opaque triangles, counter-clockwise in front, entry points `vertex` and `fragment`.
+    /// Triangles, counter-clockwise in front; viewport and scissor are set while recording.
     pub(crate) fn graphics(
         device: &Arc<Device>,
         layout: &Layout,
         info: &GraphicsInfo<'_>,
     ) -> Result<Self, Fault> {
-        let shader = Shader::new(device, info.name, info.words)?;
-        let stage = vk::PipelineShaderStageCreateInfo::default().module(shader.handle);
+        let [vertex, fragment] = info.words;
+        let vertex = Shader::new(device, info.name, vertex)?;
+        let fragment = Shader::new(device, info.name, fragment)?;
+        let stage = vk::PipelineShaderStageCreateInfo::default();
         let stages = [
-            stage.stage(vk::ShaderStageFlags::VERTEX).name(c"vertex"),
-            stage.stage(vk::ShaderStageFlags::FRAGMENT).name(c"fragment"),
+            stage.stage(vk::ShaderStageFlags::VERTEX).module(vertex.handle).name(c"vertex"),
+            stage.stage(vk::ShaderStageFlags::FRAGMENT).module(fragment.handle).name(c"fragment"),
         ];
         let input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(info.bindings)
             .vertex_attribute_descriptions(info.attributes);
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-        let extent = vk::Extent2D { width: info.size_px[0], height: info.size_px[1] };
-        let scissors = [vk::Rect2D { offset: vk::Offset2D::default(), extent }];
-        let pixels = info.size_px.map(|n| overfly_core::geodesy::narrow(f64::from(n)));
-        let viewports = [vk::Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: pixels[0],
-            height: pixels[1],
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }];
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewports(&viewports)
-            .scissors(&scissors);
+        let viewport =
+            vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
             .cull_mode(info.cull)
@@ -183,10 +178,15 @@ impl Pipeline {
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
+            .depth_test_enable(info.depth_compare.is_some())
             .depth_write_enable(info.depth_write)
-            .depth_compare_op(info.depth_compare);
+            .depth_compare_op(info.depth_compare.unwrap_or(vk::CompareOp::ALWAYS));
         let colours = [vk::PipelineColorBlendAttachmentState::default()
+            .blend_enable(info.blend)
+            .src_color_blend_factor(vk::BlendFactor::SRC_ALPHA)
+            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+            .src_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
             .color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&colours);
         let create = vk::GraphicsPipelineCreateInfo::default()
@@ -198,10 +198,11 @@ impl Pipeline {
             .multisample_state(&samples)
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
             .layout(layout.handle)
             .render_pass(info.pass.handle);
         let cache = vk::PipelineCache::null();
-        // SAFETY: layout, pass and shader are this device's and alive, and everything `create`
+        // SAFETY: layout, pass and shaders are this device's and alive, and everything `create`
         // points to outlives the call.
         let made = unsafe { device.handle.create_graphics_pipelines(cache, &[create], None) };
         Self::owned(device, info.name, made, "vkCreateGraphicsPipelines")

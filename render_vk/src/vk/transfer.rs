@@ -5,9 +5,9 @@
 //! Keeps: nothing.
 //! Not here: draws (`record`).
 
+use super::descriptors::Set;
 use super::image::Image;
 use super::pipeline::{Layout, Pipeline};
-use super::storage::StorageSet;
 use super::{Buffer, Device};
 use ash::vk;
 
@@ -52,17 +52,30 @@ unsafe fn barrier(
     }
 }
 
-/// Copies the picture to the pixel buffer and leaves the image as drawing left it.
+/// Copies an image to a buffer and leaves it as drawing left it.
 pub(crate) fn read_back(
     device: &Device,
     buffer: vk::CommandBuffer,
     (image, pixels): (&Image, &Buffer),
     size_px: [u32; 2],
 ) {
-    let drawn = vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL;
+    let is_depth = image.aspect.contains(vk::ImageAspectFlags::DEPTH);
+    let (drawn, write, stage) = if is_depth {
+        (
+            vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+            vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            vk::PipelineStageFlags::LATE_FRAGMENT_TESTS,
+        )
+    } else {
+        (
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            vk::AccessFlags::COLOR_ATTACHMENT_WRITE,
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+        )
+    };
     let read = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
     let all = vk::ImageSubresourceRange::default()
-        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .aspect_mask(image.aspect)
         .level_count(1)
         .layer_count(1);
     let turn = vk::ImageMemoryBarrier::default()
@@ -73,24 +86,22 @@ pub(crate) fn read_back(
     let to_read = turn
         .old_layout(drawn)
         .new_layout(read)
-        .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+        .src_access_mask(write)
         .dst_access_mask(vk::AccessFlags::TRANSFER_READ);
     let to_drawn = turn
         .old_layout(read)
         .new_layout(drawn)
         .src_access_mask(vk::AccessFlags::TRANSFER_READ)
-        .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
+        .dst_access_mask(write);
     let to_host = vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
         .dst_access_mask(vk::AccessFlags::HOST_READ);
-    let layers = vk::ImageSubresourceLayers::default()
-        .aspect_mask(vk::ImageAspectFlags::COLOR)
-        .layer_count(1);
+    let aspect = if is_depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+    let layers = vk::ImageSubresourceLayers::default().aspect_mask(aspect).layer_count(1);
     let [width, height] = size_px;
     let region = vk::BufferImageCopy::default()
         .image_subresource(layers)
         .image_extent(vk::Extent3D { width, height, depth: 1 });
-    let output = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT;
     let copy = vk::PipelineStageFlags::TRANSFER;
     let flags = vk::DependencyFlags::empty();
     let (image, pixels) = (image.handle, pixels.handle);
@@ -98,9 +109,9 @@ pub(crate) fn read_back(
     // SAFETY: the buffer is being recorded, outside a pass; a picture was drawn, so the image is
     // in the layout that passes end in; the pixel buffer has four bytes a pixel.
     unsafe {
-        device.cmd_pipeline_barrier(buffer, output, copy, flags, &[], &[], &[to_read]);
+        device.cmd_pipeline_barrier(buffer, stage, copy, flags, &[], &[], &[to_read]);
         device.cmd_copy_image_to_buffer(buffer, image, read, pixels, &[region]);
-        device.cmd_pipeline_barrier(buffer, copy, output, flags, &[], &[], &[to_drawn]);
+        device.cmd_pipeline_barrier(buffer, copy, stage, flags, &[], &[], &[to_drawn]);
         let host = vk::PipelineStageFlags::HOST;
         device.cmd_pipeline_barrier(buffer, copy, host, flags, &[to_host], &[], &[]);
     }
@@ -111,7 +122,7 @@ pub(crate) fn self_test(
     device: &Device,
     buffer: vk::CommandBuffer,
     (pipeline, layout): (&Pipeline, &Layout),
-    set: &StorageSet,
+    set: &Set,
     groups: u32,
 ) {
     let compute = vk::PipelineBindPoint::COMPUTE;
@@ -124,7 +135,7 @@ pub(crate) fn self_test(
     unsafe {
         let handle = &device.handle;
         handle.cmd_bind_pipeline(buffer, compute, pipeline.handle);
-        handle.cmd_bind_descriptor_sets(buffer, compute, layout.handle, 0, &[set.set], &[]);
+        handle.cmd_bind_descriptor_sets(buffer, compute, layout.handle, 0, &[set.handle], &[]);
         handle.cmd_dispatch(buffer, groups, 1, 1);
         barrier(device, buffer, stages, to_host);
     }
@@ -141,3 +152,65 @@ pub(crate) fn hazard(device: &Device, buffer: vk::CommandBuffer, scratch: &Buffe
         device.handle.cmd_copy_buffer(buffer, both, both, &[region(16, 32)]);
     }
 }
+
+/// Copies the picture, scaled where sizes differ, into an image of a window, and leaves the picture
+/// as drawing left it.
+pub(crate) fn blit(
+    device: &Device,
+    buffer: vk::CommandBuffer,
+    (picture, from_px): (&Image, [u32; 2]),
+    (window, to_px): (vk::Image, [u32; 2]),
+) {
+    let all = vk::ImageSubresourceRange::default()
+        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .level_count(1)
+        .layer_count(1);
+    let turn = |image, from: Use, to: Use| {
+        vk::ImageMemoryBarrier::default()
+            .image(image)
+            .subresource_range(all)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .old_layout(from.0)
+            .src_access_mask(from.1)
+            .new_layout(to.0)
+            .dst_access_mask(to.1)
+    };
+    let nothing = vk::AccessFlags::empty();
+    let read = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::AccessFlags::TRANSFER_READ);
+    let written = (vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::AccessFlags::TRANSFER_WRITE);
+    let drawn =
+        (vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
+    let unknown = (vk::ImageLayout::UNDEFINED, nothing);
+    let shown = (vk::ImageLayout::PRESENT_SRC_KHR, nothing);
+    let before = [turn(picture.handle, drawn, read), turn(window, unknown, written)];
+    let after = [turn(picture.handle, read, drawn), turn(window, written, shown)];
+    let layers = vk::ImageSubresourceLayers::default()
+        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .layer_count(1);
+    let corner = |size_px: [u32; 2]| {
+        let [x, y] = size_px.map(|n| i32::try_from(n).expect("sizes are below the device's limit"));
+        vk::Offset3D { x, y, z: 1 }
+    };
+    let region = vk::ImageBlit::default()
+        .src_subresource(layers)
+        .src_offsets([vk::Offset3D::default(), corner(from_px)])
+        .dst_subresource(layers)
+        .dst_offsets([vk::Offset3D::default(), corner(to_px)]);
+    let filter = if from_px == to_px { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+    let output = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT;
+    let copy = vk::PipelineStageFlags::TRANSFER;
+    let flags = vk::DependencyFlags::empty();
+    let device = &device.handle;
+    // SAFETY: the buffer is being recorded, outside a pass; a picture was drawn, so it is in the
+    // layout that passes end in; the window's image was acquired, and the submit's copies wait for
+    // that.
+    unsafe {
+        device.cmd_pipeline_barrier(buffer, output | copy, copy, flags, &[], &[], &before);
+        device.cmd_blit_image(buffer, picture.handle, read.0, window, written.0, &[region], filter);
+        device.cmd_pipeline_barrier(buffer, copy, output, flags, &[], &[], &after);
+    }
+}
+
+/// A layout and the accesses in it.
+type Use = (vk::ImageLayout, vk::AccessFlags);

@@ -1,0 +1,14 @@
+// The ground's vertices, moving.
+@vertex
+fn vertex(own: Own, skin: Skin, morph: Morph) -> Point {
+    let left = left_of(morph);
+    let offset = placed(own, left * morph.from_m);
+    var out: Point;
+    out.position = clipped(pictured(own, offset));
+    out.offset = offset;
+    let normal = oct_unfolded(skin.normal_oct);
+    out.normal = mix(normal, oct_unfolded(morph.normal_oct), left);
+    out.layers = mix(skin.layers, morph.layers, left);
+    out.height_m = skin.height_m;
+    return out;
+}

@@ -1,0 +1,48 @@
+// What every program knows: the view and the depth range.
+
+// ---- `ViewTerms` in src/matrices.rs, 160 bytes ----
+struct View {
+    eye_hi: vec3<f32>,        // body-fixed eye, metres, as a two-float
+    air: f32,                 // 1 with an atmosphere, else 0
+    eye_lo: vec3<f32>,
+    sea: f32,                 // 1 where ground below height 0 is water, else 0
+    right: vec3<f32>,         // unit vectors of the picture, body-fixed axes
+    inverse_tan_x: f32,       // 1 / tangent of half the field of view
+    up: vec3<f32>,
+    inverse_tan_y: f32,
+    forward: vec3<f32>,
+    body_radius_m: f32,       // |eye| - height: radius of the body under the eye
+    eye_up: vec3<f32>,        // geodetic normal under the eye
+    eye_height_m: f32,
+    sun: vec3<f32>,           // towards the light
+    sun_on: f32,              // 1 with a sun; 0: lit evenly from above the eye
+    detail_m: vec3<f32>,      // the eye in a cube of 4096 m, for what is fixed to the body
+    pixel_rad: f32,           // angle of a pixel in the middle of the picture
+    now_ms: u32,              // time of the flight, modulo 2^32
+    morph_ms: f32,            // how long a vertex takes to its own place
+    show: u32,                // `Show` in src/picture.rs
+    tolerance_px: f32,
+    vertices_per_patch: u32,
+    segments: f32,            // along each edge of a patch
+    pixels_inverse: vec2<f32>, // 1 / width and height of the picture
+}
+
+// ---- `RangeTerms`, 16 bytes ----
+struct Range {
+    slope: f32,               // clip z = slope * w + offset
+    offset: f32,
+    far: f32,                 // depth of what is infinitely far
+    index: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+var<immediate> range: Range;
+
+fn oct_unfolded(e: vec2<f32>) -> vec3<f32> {
+    // Inverse of the octahedral map: z > 0 is the inner diamond, z < 0 is folded outwards.
+    let z = 1.0 - abs(e.x) - abs(e.y);
+    let fold = max(-z, 0.0);
+    let x = e.x + select(fold, -fold, e.x >= 0.0);
+    let y = e.y + select(fold, -fold, e.y >= 0.0);
+    return normalize(vec3<f32>(x, y, z));
+}
