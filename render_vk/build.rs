@@ -16,15 +16,18 @@ use std::{env, fs, path::PathBuf};
 /// Vertex programs of the ground: how vertices are placed × whether they move × for whom.
 const PLACES: [(&str, &[&str]); 2] =
     [("two_float", &["two_float", "place_two_float"]), ("eye", &["place_eye"])];
-const ENTRIES: [(&str, &[&str]); 4] = [
+const ENTRIES: [(&str, &[&str]); 6] = [
     ("", &["point", "vertex"]),
     ("_morph", &["point", "morph", "vertex_morph"]),
+    ("_drape", &["point_drape", "patch", "drape_place", "vertex_drape"]),
+    ("_morph_drape", &["point_drape", "patch", "drape_place", "morph", "vertex_morph_drape"]),
     ("_debug", &["point_debug", "patch", "vertex_debug"]),
     ("_morph_debug", &["point_debug", "patch", "morph", "vertex_morph_debug"]),
 ];
 
-const PROGRAMS: [(&str, &[&str]); 5] = [
-    ("terrain", &["view", "air", "grain", "point", "terrain"]),
+const PROGRAMS: [(&str, &[&str]); 6] = [
+    ("terrain", &["view", "air", "grain", "point", "no_drape", "terrain"]),
+    ("terrain_drape", &["view", "air", "grain", "point_drape", "drape", "terrain"]),
     ("debug", &["view", "point_debug", "debug"]),
     ("sky", &["view", "air", "sky"]),
     ("overlay", &["view", "overlay"]),

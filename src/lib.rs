@@ -97,7 +97,7 @@ impl Drawing {
         let renderer = renderer.as_mut()?;
         infos.clear();
         if looks.show.needs_infos() {
-            let _ = &terrain;
+            terrain.inspect(infos);
         }
         let picture = Picture {
             view,
@@ -152,6 +152,7 @@ impl Overfly {
             let mut output = house.terrain.output().lock();
             let Some(renderer) = &mut drawing.renderer else { return };
             renderer.note_built(&output.built);
+            renderer.note_tiles(&output.tiles);
             if let Some(view) = drawing.view.and_then(|index| output.views.get(index)) {
                 drawing.report = drawing.draw(&house.terrain, (view, output.time_ms), team);
             }
@@ -171,7 +172,8 @@ impl Overfly {
     }
 
     /// The renderer that shall draw from now on; its settings must be made for this scene.
-    pub fn set_renderer(&mut self, renderer: Renderer) {
+    pub fn set_renderer(&mut self, mut renderer: Renderer) {
+        renderer.note_tiles(&self.house.terrain.tiles());
         self.house.drawing.lock().renderer = Some(renderer);
     }
 

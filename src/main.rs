@@ -3,10 +3,12 @@
 //! In:    arguments.
 //! Out:   tables, files, an exit code: 0 good, 1 diverged, 2 bad input, 130 interrupted.
 //! Keeps: nothing.
-//! Not here: what the commands do (`cli`).
+//! Not here: what the commands do (`cli`), the window (`viewer`).
 #![forbid(unsafe_code)]
 
+#[macro_use]
 mod cli;
+mod viewer;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -23,6 +25,10 @@ struct Arguments {
 enum Command {
     /// Flies a flight or plays a recording: times every stage, draws stills, checks digests.
     Replay(cli::replay::Arguments),
+    /// Draws one picture from one place.
+    Still(cli::still::Arguments),
+    /// Opens a window to fly in, and to watch flights and recordings.
+    View(cli::view::Arguments),
     /// Checks a scene file and shows what it resolves to; all faults at once.
     Check(cli::check::Arguments),
     /// Says how high the ground is at places, and how sure that is; CSV or JSON.
@@ -43,6 +49,8 @@ fn main() -> ExitCode {
     };
     let outcome = match arguments.command {
         Command::Replay(arguments) => cli::replay::run(&arguments),
+        Command::Still(arguments) => cli::still::run(&arguments),
+        Command::View(arguments) => cli::view::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
         Command::Probe(arguments) => cli::probe::run(&arguments),
         Command::Ingest(arguments) => cli::ingest::run(&arguments),

@@ -1,18 +1,19 @@
-//! Where a scene's pages come from: its open archives, their tiles, the generator.
+//! Where a scene's pages come from: its open archives, their tiles and imagery, the generator.
 //!
 //! In:    the settings of a scene; page keys.
-//! Out:   pages; which level the data has at a place; why there is no page.
+//! Out:   pages, with colour or without; which level the data has at a place; why there is no page.
 //! Keeps: open archives, decoded tiles of bounded size, shared by all threads.
 //! Not here: threads (`loader`), reading archives (`overfly_archive`), heights (`overfly_core`).
 
-use crate::archive::{Archive, ArchiveError, Location, OpenOptions};
+use crate::archive::{Archive, ArchiveError, Imagery, Location, OpenOptions};
 use crate::core::datasource::codec::{TileFault, decode};
+use crate::core::datasource::colour::lay_over;
 use crate::core::datasource::compose::{Need, cell_of};
 use crate::core::datasource::generate::Generator;
 use crate::core::datasource::key::{DEPTH_MAX, PAGE_BITS};
 use crate::core::datasource::page::SAMPLES;
 use crate::core::datasource::tile::{FULL, LayerTile, Tile};
-use crate::core::datasource::{Page, PageKey};
+use crate::core::datasource::{ColourTile, Page, PageKey};
 use crate::core::geodesy::{Ellipsoid, Geodetic};
 use crate::core::ground::{Place, Query};
 use crate::core::lattice::RADIUS;
@@ -21,10 +22,15 @@ use glam::IVec3;
 use lru::LruCache;
 use parking_lot::Mutex;
 use std::fmt;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 /// Decoded tiles are kept up to this size together.
 const TILES_BYTES_MAX: usize = 64 << 20;
+
+/// Tiles of imagery are kept so many, 65 KiB each: those that finer tiles of other archives lie
+/// over.
+const COLOURS_MAX: NonZeroUsize = NonZeroUsize::new(128).expect("more than none");
 
 /// Bodies whose radii and flattening differ by no more than this share are the same.
 const BODY_TOLERANCE: f64 = 1e-9;
@@ -33,7 +39,10 @@ const BODY_TOLERANCE: f64 = 1e-9;
 pub struct Sources {
     generator: Generator,
     archives: Vec<Archive>,
+    /// The topmost first.
+    imagery: Vec<Imagery>,
     tiles: Mutex<Tiles>,
+    colours: Mutex<LruCache<(usize, PageKey), Option<Arc<ColourTile>>>>,
     body: Ellipsoid,
     sea: bool,
 }
@@ -128,11 +137,15 @@ impl Sources {
         let body = settings.body;
         let archives: Vec<_> =
             settings.archives().map(|name| open(name, &body, options)).collect::<Result<_, _>>()?;
+        let imagery = settings.imagery.iter().map(|name| open_imagery(name, &body, options));
+        let imagery = imagery.collect::<Result<_, _>>()?;
         let facts = archives.iter().map(|archive| archive.facts().clone()).collect();
         Ok(Self {
             generator: Generator::with_archives(settings, facts),
             archives,
+            imagery,
             tiles: Mutex::new(Tiles { recent: LruCache::unbounded(), bytes: 0 }),
+            colours: Mutex::new(LruCache::new(COLOURS_MAX)),
             body,
             sea: settings.sea,
         })
@@ -148,6 +161,11 @@ impl Sources {
         &self.archives
     }
 
+    /// The open archives of imagery, in the scene's order.
+    pub fn imagery(&self) -> &[Imagery] {
+        &self.imagery
+    }
+
     /// The scene's body.
     pub fn body(&self) -> &Ellipsoid {
         &self.body
@@ -158,22 +176,99 @@ impl Sources {
         self.sea
     }
 
-    /// Hashes of what the archives hold, in the scene's order.
+    /// Hashes of what the archives hold, in the scene's order: those of elevation, then those of
+    /// imagery.
     pub fn contents(&self) -> Vec<u64> {
-        self.archives.iter().map(|archive| archive.facts().content).collect()
+        let elevation = self.archives.iter().map(|archive| archive.facts().content);
+        elevation.chain(self.imagery.iter().map(|archive| archive.facts().content)).collect()
     }
 
-    /// Makes a page. Blocks while tiles are read.
+    /// Makes a page, without colour. Blocks while tiles are read.
     ///
     /// # Errors
     /// A tile cannot be had or is damaged.
     pub fn page(&self, key: PageKey) -> Result<Arc<Page>, SourceError> {
-        if self.archives.is_empty() {
-            return Ok(self.generator.page(key));
+        self.page_with(key, None)
+    }
+
+    /// Makes a page with its colour. Where imagery cannot be had the page comes without any, for
+    /// the ground must not wait for it, and why comes with it. Blocks while tiles are read.
+    ///
+    /// # Errors
+    /// A tile of elevation cannot be had or is damaged.
+    pub fn coloured_page(
+        &self,
+        key: PageKey,
+    ) -> Result<(Arc<Page>, Option<SourceError>), SourceError> {
+        let (colour, fault) = match self.colour(key) {
+            Ok(colour) => (colour, None),
+            Err(error) => (None, Some(error)),
+        };
+        Ok((self.page_with(key, colour)?, fault))
+    }
+
+    /// The imagery of a page's cell, all archives over each other: the first that shows anything at
+    /// a texel hides the others there. `None` where no archive has a tile of exactly this cell.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn colour(&self, key: PageKey) -> Result<Option<Arc<ColourTile>>, SourceError> {
+        let deepest = |archive: &Imagery| archive.facts().depth;
+        if self.imagery.iter().all(|archive| deepest(archive) < key.depth()) {
+            return Ok(None);
         }
+        let mut exact = false;
+        let mut all: Option<Arc<ColourTile>> = None;
+        for (index, archive) in self.imagery.iter().enumerate() {
+            let reached = deepest(archive) >= key.depth();
+            let tile = if reached {
+                archive.colour(key).map_err(SourceError::Archive)?.map(Arc::new)
+            } else {
+                self.coarser_colour(index, key)?
+            };
+            let Some(tile) = tile else { continue };
+            exact |= reached;
+            all = Some(all.map_or_else(|| tile.clone(), |upper| laid_over(&upper, &tile)));
+            if all.iter().all(|all| all.rgba.iter().all(|texel| texel[3] == u8::MAX)) {
+                break;
+            }
+        }
+        Ok(all.filter(|_| exact))
+    }
+
+    /// What an archive whose last tiles are coarser shows in a cell.
+    fn coarser_colour(
+        &self,
+        index: usize,
+        key: PageKey,
+    ) -> Result<Option<Arc<ColourTile>>, SourceError> {
+        let archive = &self.imagery[index];
+        let above = key.ancestor(archive.facts().depth);
+        let known = self.colours.lock().get(&(index, above)).cloned();
+        let tile = match known {
+            Some(tile) => tile,
+            None => {
+                let tile = archive.colour(above).map_err(SourceError::Archive)?.map(Arc::new);
+                self.colours.lock().put((index, above), tile.clone());
+                tile
+            }
+        };
+        let within = |tile: Arc<ColourTile>| {
+            let texels = tile.texels_of(key);
+            let shows = texels.iter().any(|texel| texel[3] > 0);
+            shows.then(|| Arc::new(ColourTile::new(key, texels)))
+        };
+        Ok(tile.and_then(within))
+    }
+
+    fn page_with(
+        &self,
+        key: PageKey,
+        colour: Option<Arc<ColourTile>>,
+    ) -> Result<Arc<Page>, SourceError> {
         let needs = self.generator.needs(key);
         let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
-        Ok(self.generator.page_from(key, &tiles.collect::<Result<Vec<_>, _>>()?))
+        Ok(self.generator.page_with(key, &tiles.collect::<Result<Vec<_>, _>>()?, colour))
     }
 
     /// Height of the ground itself above the ellipsoid, at the lattice point next to a place.
@@ -261,6 +356,7 @@ impl Sources {
     /// that wants to end while a server is silent.
     pub fn close(&self) {
         self.archives.iter().for_each(Archive::close);
+        self.imagery.iter().for_each(Imagery::close);
     }
 
     fn tile(&self, archive: usize, key: PageKey) -> Result<Option<Arc<Tile>>, SourceError> {
@@ -320,13 +416,40 @@ fn bytes_of(tile: Option<&Tile>) -> usize {
     NOTE + tile.map_or(0, |tile| tile.layers.iter().map(layer).sum())
 }
 
+fn laid_over(upper: &ColourTile, lower: &ColourTile) -> Arc<ColourTile> {
+    let mut rgba = upper.rgba.clone();
+    lay_over(&mut rgba, &lower.rgba);
+    Arc::new(ColourTile::new(upper.key, rgba))
+}
+
 fn open(name: &str, wanted: &Ellipsoid, options: &OpenOptions) -> Result<Archive, SourceError> {
     let archive = Archive::open(&Location::parse(name), options).map_err(SourceError::Archive)?;
-    let found = archive.facts().body;
+    let facts = archive.facts();
+    check_body(name, (&facts.body_name, facts.body), wanted)?;
+    Ok(archive)
+}
+
+fn open_imagery(
+    name: &str,
+    wanted: &Ellipsoid,
+    options: &OpenOptions,
+) -> Result<Imagery, SourceError> {
+    let archive = Imagery::open_imagery(&Location::parse(name), options);
+    let archive = archive.map_err(SourceError::Archive)?;
+    let facts = archive.facts();
+    check_body(name, (&facts.body_name, facts.body), wanted)?;
+    Ok(archive)
+}
+
+fn check_body(
+    name: &str,
+    (found_name, found): (&str, Ellipsoid),
+    wanted: &Ellipsoid,
+) -> Result<(), SourceError> {
     let like = |a: f64, b: f64| (a - b).abs() <= BODY_TOLERANCE * a.abs().max(b.abs());
     if like(found.a_m, wanted.a_m) && like(found.f, wanted.f) {
-        return Ok(archive);
+        return Ok(());
     }
-    let found_name = archive.facts().body_name.clone();
-    Err(SourceError::Body { archive: name.to_owned(), found_name, found, wanted: *wanted })
+    let (archive, found_name) = (name.to_owned(), found_name.to_owned());
+    Err(SourceError::Body { archive, found_name, found, wanted: *wanted })
 }

@@ -9,6 +9,8 @@ mod architecture;
 mod contracts {
     mod archives;
     mod command_line;
+    mod cracks;
+    mod depths;
     mod flights;
     mod grounds;
     mod hills;
@@ -19,4 +21,6 @@ mod contracts {
     #[allow(dead_code, reason = "the archive's own tests let it misbehave in more ways")]
     #[path = "../../archive/tests/contracts/server.rs"]
     mod server;
+    mod validation;
+    mod window;
 }

@@ -31,6 +31,13 @@ pub enum ArchiveFault {
         /// What its tiles are.
         tile_type: &'static str,
     },
+    /// It is ours, but holds something else than what it was opened for.
+    Kind {
+        /// What it holds.
+        found: &'static str,
+        /// What it was opened for.
+        wanted: &'static str,
+    },
     /// It is terrain of ours in a format that this build does not know.
     FormatVersion(u64),
     /// Its metadata has a wrong type or a value out of range.
@@ -72,6 +79,9 @@ impl fmt::Display for ArchiveFault {
                 "it is a PMTiles archive of another kind: its tiles are {tile_type}, and its \
                  metadata has no \"overfly\""
             ),
+            Self::Kind { found, wanted } => {
+                write!(f, "it holds {found}, and is named where {wanted} is read")
+            }
             Self::FormatVersion(found) => {
                 write!(f, "its terrain is of format version {found}, only version 1 is read")
             }

@@ -1,12 +1,13 @@
-//! Terrain archives: tiles of the octahedral square in a PMTiles file, on disk or on a server.
+//! Archives of terrain: tiles of the octahedral square in a PMTiles file, on disk or on a server.
 //!
 //! In:    a path or an http(s) address.
-//! Out:   facts from the metadata, the bytes of single tiles.
+//! Out:   facts from the metadata, the bytes of single tiles, colours of imagery.
 //! Keeps: the mapped file or the connections, directories that were read, failures.
-//! Not here: what a tile's bytes mean (`overfly_core::datasource`), writing (`overfly_ingest`).
+//! Not here: what a height's bytes mean (`overfly_core::datasource`), writing (`overfly_ingest`).
 #![forbid(unsafe_code)]
 
 mod breaker;
+pub mod colour;
 mod directories;
 mod fault;
 mod header;
@@ -16,11 +17,12 @@ mod source;
 mod unpack;
 
 pub use fault::{ArchiveError, ArchiveFault};
-pub use overfly_core::datasource::facts::{ArchiveFacts, Datum, LayerFacts};
+pub use metadata::Facts;
+pub use overfly_core::datasource::facts::{ArchiveFacts, Datum, ImageryFacts, LayerFacts};
 
 use directories::Directories;
 use header::{Sections, tile_name};
-use overfly_core::datasource::PageKey;
+use overfly_core::datasource::{ColourTile, PageKey};
 use overfly_core::settings::is_address;
 use overfly_jobs::now_ns;
 use parking_lot::Mutex;
@@ -107,38 +109,102 @@ pub struct Health {
 /// A file is mapped: whoever replaces it must rename a new one over it. One that is written to in
 /// place is noticed before a read, but one that is cut in the very middle of a read ends the
 /// process.
-pub struct Archive {
+///
+/// `F` is what it says about itself, and so what it holds: heights unless it says otherwise.
+pub struct Archive<F = ArchiveFacts> {
     name: String,
     reader: AsyncPmTilesReader<Source, Directories>,
     place: Arc<Place>,
     sections: Arc<Sections>,
-    facts: ArchiveFacts,
+    facts: F,
     health: Mutex<Health>,
 }
 
-impl fmt::Debug for Archive {
+/// An archive of imagery.
+pub type Imagery = Archive<ImageryFacts>;
+
+impl<F: fmt::Debug> fmt::Debug for Archive<F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Archive").field("name", &self.name).field("facts", &self.facts).finish()
     }
 }
 
 impl Archive {
-    /// Opens an archive and reads its metadata. Blocks, for a server up to its time-outs.
+    /// Opens an archive of heights and reads its metadata. Blocks, for a server up to its
+    /// time-outs.
     ///
     /// # Errors
     /// It cannot be reached, is damaged, of another kind or of an unknown version.
     pub fn open(location: &Location, options: &OpenOptions) -> Result<Self, ArchiveError> {
+        Self::open_as(location, options, |facts| match facts {
+            Facts::Elevation(facts) => Ok(facts),
+            Facts::Imagery(_) => Err(ArchiveFault::Kind { found: "imagery", wanted: "elevation" }),
+        })
+    }
+}
+
+impl Imagery {
+    /// Opens an archive of imagery and reads its metadata. Blocks, for a server up to its
+    /// time-outs.
+    ///
+    /// # Errors
+    /// It cannot be reached, is damaged, of another kind or of an unknown version.
+    pub fn open_imagery(location: &Location, options: &OpenOptions) -> Result<Self, ArchiveError> {
+        Self::open_as(location, options, |facts| match facts {
+            Facts::Imagery(facts) => Ok(facts),
+            Facts::Elevation(_) => {
+                Err(ArchiveFault::Kind { found: "elevation", wanted: "imagery" })
+            }
+        })
+    }
+
+    /// The colours of a page's cell; `None` where the archive has none. Blocks as [`Self::tile`].
+    ///
+    /// # Errors
+    /// The tile cannot be had, or is damaged.
+    pub fn colour(&self, key: PageKey) -> Result<Option<ColourTile>, ArchiveError> {
+        let decoded = |bytes: Vec<u8>| {
+            let rgba = colour::decode(&bytes).map_err(|what| {
+                let (z, x, y) = key.zxy();
+                ArchiveFault::Corrupt(format!("tile {z}/{x}/{y}: {what}"))
+            })?;
+            Ok(ColourTile::new(key, rgba))
+        };
+        self.noted(self.fetch(key).and_then(|bytes| bytes.map(decoded).transpose()))
+    }
+}
+
+impl Archive<Facts> {
+    /// Opens an archive of whatever kind, to show what it says about itself.
+    ///
+    /// # Errors
+    /// It cannot be reached, is damaged, not ours or of an unknown version.
+    pub fn open_any(location: &Location, options: &OpenOptions) -> Result<Self, ArchiveError> {
+        Self::open_as(location, options, Ok)
+    }
+}
+
+impl<F> Archive<F> {
+    fn open_as(
+        location: &Location,
+        options: &OpenOptions,
+        kind: impl Fn(Facts) -> Result<F, ArchiveFault>,
+    ) -> Result<Self, ArchiveError> {
         let opened = match location {
             Location::File(path) => Place::file(path),
             Location::Http(url) => Ok(Place::Server(Box::new(Server::new(url, options)))),
         };
         let name = location.to_string();
         opened
-            .and_then(|place| Self::read(name.clone(), Arc::new(place)))
+            .and_then(|place| Self::read(name.clone(), Arc::new(place), kind))
             .map_err(|fault| ArchiveError { archive: name, fault })
     }
 
-    fn read(name: String, place: Arc<Place>) -> Result<Self, ArchiveFault> {
+    fn read(
+        name: String,
+        place: Arc<Place>,
+        kind: impl Fn(Facts) -> Result<F, ArchiveFault>,
+    ) -> Result<Self, ArchiveFault> {
         let source = Source::new(place.clone())?;
         let sections = source.sections().clone();
         let opening = AsyncPmTilesReader::try_from_cached_source(source, Directories::default());
@@ -148,7 +214,7 @@ impl Archive {
             PmtError::InvalidMetadata => foreign(),
             other => ArchiveFault::from_pmtiles(other),
         })?;
-        let facts = metadata::from_json(&metadata)?.ok_or_else(foreign)?;
+        let facts = kind(metadata::from_json(&metadata)?.ok_or_else(foreign)?)?;
         if matches!(sections.tile_compression, Compression::Unknown | Compression::Brotli) {
             let how = sections.tile_compression;
             let what = format!("its tiles are compressed as {how:?}; gzip and zstd are read");
@@ -163,7 +229,7 @@ impl Archive {
     }
 
     /// What the archive says about itself, every range checked.
-    pub fn facts(&self) -> &ArchiveFacts {
+    pub fn facts(&self) -> &F {
         &self.facts
     }
 
@@ -173,7 +239,11 @@ impl Archive {
     /// # Errors
     /// The tile cannot be had, or is damaged.
     pub fn tile(&self, key: PageKey) -> Result<Option<Vec<u8>>, ArchiveError> {
-        self.fetch(key).map_err(|fault| {
+        self.noted(self.fetch(key))
+    }
+
+    fn noted<T>(&self, outcome: Result<T, ArchiveFault>) -> Result<T, ArchiveError> {
+        outcome.map_err(|fault| {
             self.note(&fault);
             ArchiveError { archive: self.name.clone(), fault }
         })

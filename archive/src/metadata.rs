@@ -1,13 +1,17 @@
 //! The JSON form of what an archive says about itself.
 //!
-//! In:    [`ArchiveFacts`]; or the metadata of a PMTiles archive.
+//! In:    [`Facts`]; or the metadata of a PMTiles archive.
 //! Out:   metadata with the key "overfly"; or facts, every range checked.
 //! Keeps: nothing.
 //! Not here: reading it from an archive (`lib`), what facts are used for (`overfly_core`).
 
+mod imagery;
+
+pub use imagery::imagery_to_json;
+
 use crate::fault::ArchiveFault;
 use overfly_core::datasource::facts::{
-    ArchiveFacts, Datum, FORMAT_VERSION, LAYERS_MAX, LayerFacts,
+    ArchiveFacts, Datum, FORMAT_VERSION, ImageryFacts, LAYERS_MAX, LayerFacts,
 };
 use overfly_core::datasource::key::DEPTH_MAX;
 use overfly_core::geodesy::Ellipsoid;
@@ -19,9 +23,29 @@ const KEY: &str = "overfly";
 /// The key of facts for people beside them, one for each source; not read back.
 const SOURCES_KEY: &str = "overfly_sources";
 
+/// What an archive holds, as it says itself.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Facts {
+    /// Heights.
+    Elevation(ArchiveFacts),
+    /// Colours.
+    Imagery(ImageryFacts),
+}
+
+/// Archives that do not say are of elevation: the first ones did not.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Default)]
+#[serde(rename_all = "lowercase")]
+enum RawKind {
+    #[default]
+    Elevation,
+    Imagery,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawFacts {
+    #[serde(default)]
+    kind: RawKind,
     version: u32,
     body: RawBody,
     datum: RawDatum,
@@ -72,6 +96,7 @@ pub fn to_json(facts: &ArchiveFacts, sources: Value) -> String {
         sources: layer.sources.clone(),
     };
     let raw = RawFacts {
+        kind: RawKind::Elevation,
         version: facts.version,
         body: RawBody { name: facts.body_name.clone(), a_m: facts.body.a_m, f: facts.body.f },
         datum: match facts.datum {
@@ -88,25 +113,45 @@ pub fn to_json(facts: &ArchiveFacts, sources: Value) -> String {
 /// The facts within an archive's metadata; `None` where there are none of ours.
 ///
 /// # Errors
-/// No JSON, another format version, a wrong type, a value out of range.
-pub fn from_json(text: &str) -> Result<Option<ArchiveFacts>, ArchiveFault> {
+/// No JSON, another kind or format version, a wrong type, a value out of range.
+pub fn from_json(text: &str) -> Result<Option<Facts>, ArchiveFault> {
     let metadata = |error: serde_json::Error| ArchiveFault::Metadata(error.to_string());
     let mut all: Value = serde_json::from_str(text).map_err(metadata)?;
     let Some(ours) = all.get_mut(KEY) else { return Ok(None) };
+    // Both kinds count their versions from 1 and have come no further.
     match ours.get("version").and_then(Value::as_u64) {
         None => return Err(ArchiveFault::Metadata("its version is not a whole number".into())),
         Some(version) if version == u64::from(FORMAT_VERSION) => {}
         Some(version) => return Err(ArchiveFault::FormatVersion(version)),
     }
-    let raw: RawFacts = serde_json::from_value(ours.take()).map_err(metadata)?;
+    match ours.get("kind").map_or(Ok(RawKind::default()), RawKind::deserialize) {
+        Ok(RawKind::Elevation) => elevation(ours.take()).map(|facts| Some(Facts::Elevation(facts))),
+        Ok(RawKind::Imagery) => {
+            imagery::from_value(ours.take()).map(|facts| Some(Facts::Imagery(facts)))
+        }
+        Err(_) => {
+            let what = format!("kind is {}, neither \"elevation\" nor \"imagery\"", ours["kind"]);
+            Err(ArchiveFault::Metadata(what))
+        }
+    }
+}
+
+fn elevation(ours: Value) -> Result<ArchiveFacts, ArchiveFault> {
+    let raw: RawFacts = serde_json::from_value(ours)
+        .map_err(|error: serde_json::Error| ArchiveFault::Metadata(error.to_string()))?;
     let facts = resolved(raw).map_err(ArchiveFault::Metadata)?;
     check(&facts).map_err(ArchiveFault::Metadata)?;
-    Ok(Some(facts))
+    Ok(facts)
+}
+
+/// A hash as it is written.
+fn content_of(text: &str) -> Result<u64, String> {
+    let digits = text.len() == 16 && text.bytes().all(|c| c.is_ascii_hexdigit());
+    let content = u64::from_str_radix(text, 16).ok().filter(|_| digits);
+    content.ok_or_else(|| "content is not 16 hexadecimal digits".into())
 }
 
 fn resolved(raw: RawFacts) -> Result<ArchiveFacts, String> {
-    let digits = raw.content.len() == 16 && raw.content.bytes().all(|c| c.is_ascii_hexdigit());
-    let content = u64::from_str_radix(&raw.content, 16).ok().filter(|_| digits);
     let layer = |raw: RawLayer| LayerFacts {
         depth: raw.depth,
         quantum_m: raw.quantum_m,
@@ -123,7 +168,7 @@ fn resolved(raw: RawFacts) -> Result<ArchiveFacts, String> {
             RawDatum::Ellipsoid => Datum::Ellipsoid,
         },
         height_range_m: raw.height_range_m,
-        content: content.ok_or("content is not 16 hexadecimal digits")?,
+        content: content_of(&raw.content)?,
         layers: raw.layers.into_iter().map(layer).collect(),
     })
 }
@@ -133,11 +178,7 @@ fn check(facts: &ArchiveFacts) -> Result<(), String> {
     if facts.version != FORMAT_VERSION {
         return Err(format!("version is {}, not {FORMAT_VERSION}", facts.version));
     }
-    if facts.body_name.is_empty() || facts.body_name.len() > 64 {
-        return Err("body.name is not 1 to 64 bytes long".into());
-    }
-    within("body.a_m", facts.body.a_m, [500.0, 1e9])?;
-    within("body.f", facts.body.f, [-0.5, 0.5])?;
+    named(&facts.body_name, &facts.body)?;
     let [low_m, high_m] = facts.height_range_m;
     within("height_range_m[0]", low_m, [-1e7, 1e7])?;
     within("height_range_m[1]", high_m, [low_m, 1e7])?;
@@ -148,6 +189,14 @@ fn check(facts: &ArchiveFacts) -> Result<(), String> {
         return Err("layers are not sorted by depth".into());
     }
     facts.layers.iter().enumerate().try_for_each(|(i, layer)| check_layer(i, layer))
+}
+
+fn named(body_name: &str, body: &Ellipsoid) -> Result<(), String> {
+    if body_name.is_empty() || body_name.len() > 64 {
+        return Err("body.name is not 1 to 64 bytes long".into());
+    }
+    within("body.a_m", body.a_m, [500.0, 1e9])?;
+    within("body.f", body.f, [-0.5, 0.5])
 }
 
 fn check_layer(i: usize, layer: &LayerFacts) -> Result<(), String> {
@@ -193,7 +242,10 @@ mod tests {
     #[test]
     fn facts_come_back_as_they_were_written() {
         let text = to_json(&facts(), json!([{ "file": "a.tif", "licence": "CC0" }]));
-        assert_eq!(from_json(&text).unwrap(), Some(facts()));
+        assert_eq!(from_json(&text).unwrap(), Some(Facts::Elevation(facts())));
+        let untold = text.replace("\"kind\":\"elevation\",", "");
+        assert_ne!(untold, text);
+        assert_eq!(from_json(&untold).unwrap(), Some(Facts::Elevation(facts())));
         assert!(text.contains("00fedcba98765432") && text.contains("CC0"));
     }
 

@@ -8,6 +8,9 @@
 use std::fmt::{self, Display, Formatter};
 use std::io;
 
+/// Fields as they were called in earlier versions, and now.
+const FORMER: [(&str, &str); 1] = [("splits_m", "ranges")];
+
 /// Every fault of one file, in the order of its lines. Never empty.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SceneFaults {
@@ -50,7 +53,7 @@ pub enum FaultKind {
         /// As written.
         name: String,
         /// The variants that this place knows.
-        known: &'static [&'static str],
+        known: Vec<&'static str>,
     },
     /// The field was given before; the first one counts.
     DuplicateField {
@@ -134,7 +137,9 @@ impl Display for FaultKind {
 
 fn unknown(f: &mut Formatter, what: &str, name: &str, known: &[&str]) -> fmt::Result {
     write!(f, "unknown {what} {name}")?;
-    if let Some(near) = nearest(name, known) {
+    if let Some((_, now)) = FORMER.iter().find(|(old, now)| *old == name && known.contains(now)) {
+        write!(f, ", it is called {now} now")
+    } else if let Some(near) = nearest(name, known) {
         write!(f, ", did you mean {near}?")
     } else {
         write!(f, ", known here: {}", known.join(", "))

@@ -248,17 +248,62 @@ impl<'t> Reader<'t> {
     /// The variant that `node` names, one of `known`.
     pub(crate) fn variant(
         &mut self,
-        node: &'t Node,
+        node: &Node,
         path: &str,
         known: &'static [&'static str],
     ) -> Option<&'static str> {
+        self.named(node, path, known.to_vec()).map(|i| known[i])
+    }
+
+    /// One of some names that stand alone; the first if it is left out.
+    pub(crate) fn choice<T: Copy>(
+        &mut self,
+        group: &Group,
+        name: &str,
+        known: &'static [(&'static str, T)],
+    ) -> Option<T> {
+        let Some(node) = group.get(name) else { return Some(known[0].1) };
+        let path = group.path_of(name);
+        let names = known.iter().map(|(name, _)| *name).collect();
+        let (_, value) = known[self.named(node, &path, names)?];
+        self.plain(node, &path, value)
+    }
+
+    /// The value of a variant without fields.
+    pub(crate) fn plain<T>(&mut self, node: &Node, path: &str, value: T) -> Option<T> {
+        if let Kind::Word(_) = node.kind {
+            return Some(value);
+        }
+        self.wrong_type(node, path, "the name alone");
+        None
+    }
+
+    /// Notes a list that is too short or too long.
+    pub(crate) fn counted(
+        &mut self,
+        group: &Group,
+        name: &str,
+        count: usize,
+        [least, most]: [usize; 2],
+    ) {
+        let listed = group.get(name).filter(|_| !(least..=most).contains(&count));
+        let Some(list) = listed else { return };
+        let what = FaultKind::OutOfRange {
+            found: format!("a list of {count}"),
+            allowed: format!("a list of {}", words(&(least..=most))),
+        };
+        self.fault(list.at, group.path_of(name), what);
+    }
+
+    /// Which of the names `node` has.
+    fn named(&mut self, node: &Node, path: &str, known: Vec<&'static str>) -> Option<usize> {
         let (Kind::Word(name) | Kind::Struct(Some(name), _) | Kind::Tuple(Some(name), _)) =
             &node.kind
         else {
             self.wrong_type(node, path, &format!("one of {}", known.join(", ")));
             return None;
         };
-        let variant = known.iter().find(|known| *known == name).copied();
+        let variant = known.iter().position(|known| *known == name);
         if variant.is_none() {
             let what = FaultKind::UnknownVariant { name: name.clone(), known };
             self.fault(node.at, path, what);

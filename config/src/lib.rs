@@ -8,15 +8,19 @@
 //! The presets document the format: `presets/earth.ron` spells out every setting.
 #![forbid(unsafe_code)]
 
+mod depth;
 mod fault;
 mod fields;
 mod node;
 mod scan;
 mod scene;
+mod sun;
 mod tree;
+mod utc;
 
 pub use fault::{Fault, FaultKind, LoadError, SceneFaults};
 pub use overfly_core::settings::SceneSettings;
+pub use utc::{utc_seconds, utc_text};
 
 use fields::Reader;
 use overfly_core::settings::{SourceSettings, is_address};
@@ -25,7 +29,7 @@ use std::path::Path;
 /// A scene that is compiled in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Preset {
-    /// The Earth with sea and sun; every setting is spelt out, all at their defaults.
+    /// The Earth with sea and sun; every setting is spelt out.
     Earth,
     /// The Moon: craters, sun, no sea.
     Moon,
@@ -97,15 +101,17 @@ pub fn load(name_or_path: &str) -> Result<SceneSettings, LoadError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut settings = read(text, name_or_path).map_err(LoadError::Faults)?;
     let folder = Path::new(name_or_path).parent().unwrap_or(Path::new(""));
-    settings.sources.iter_mut().for_each(|source| lead_from(folder, source));
+    let sources = settings.sources.iter_mut().filter_map(|source| match source {
+        SourceSettings::Archive { location } => Some(location),
+        SourceSettings::Procedural { .. } => None,
+    });
+    sources.chain(&mut settings.imagery).for_each(|location| lead_from(folder, location));
     Ok(settings)
 }
 
 /// A relative path leads on from the folder; an absolute one replaces it.
-fn lead_from(folder: &Path, source: &mut SourceSettings) {
-    if let SourceSettings::Archive { location } = source
-        && !is_address(location)
-    {
+fn lead_from(folder: &Path, location: &mut String) {
+    if !is_address(location) {
         let path = folder.join(&*location);
         *location = path.into_os_string().into_string().expect("both parts are UTF-8");
     }

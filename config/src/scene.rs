@@ -5,20 +5,23 @@
 //! Keeps: nothing.
 //! Not here: RON (`tree`), the wording of faults (`fault`).
 
-use crate::fault::FaultKind;
-use crate::fields::{Group, Reader, Shape, words};
+use crate::depth::depth;
+use crate::fields::{Group, Reader, Shape};
 use crate::node::{Kind, Node};
+use crate::sun::sun;
 use overfly_core::datasource::procedural::Style;
-use overfly_core::geodesy::{Ellipsoid, Geodetic};
+use overfly_core::geodesy::Ellipsoid;
 use overfly_core::settings::{
-    DepthFormat, DepthOrder, DepthSettings, LensSettings, LodSettings, MemorySettings,
-    SceneSettings, SourceSettings, SunSettings, VertexPrecision, is_address,
+    LensSettings, LodSettings, MemorySettings, SceneSettings, SourceSettings, VertexPrecision,
+    is_address,
 };
 use overfly_core::units::{Pixels, Radians};
 
 const SCENE: Shape = Shape {
     name: "Scene",
-    fields: &["body", "sources", "sea", "sun", "lod", "views", "depth", "memory"],
+    fields: &[
+        "body", "sources", "imagery", "sea", "sun", "lod", "views", "vertices", "depth", "memory",
+    ],
 };
 const BODIES: &[&str] = &["Wgs84", "Moon", "Mars", "Sphere", "Ellipsoid"];
 const SPHERE: Shape = Shape { name: "Sphere", fields: &["radius_m"] };
@@ -26,8 +29,9 @@ const ELLIPSOID: Shape = Shape { name: "Ellipsoid", fields: &["a_m", "f"] };
 const SOURCES: &[&str] = &["Archive", "Procedural"];
 const PROCEDURAL: Shape =
     Shape { name: "Procedural", fields: &["seed", "style", "relief", "finest_m", "detail"] };
-const STYLES: &[&str] = &["Earthlike", "Cratered"];
-const SUN: Shape = Shape { name: "Sun", fields: &["latitude_deg", "longitude_deg"] };
+const STYLES: &[(&str, Style)] = &[("Earthlike", Style::Earthlike), ("Cratered", Style::Cratered)];
+const PRECISIONS: &[(&str, VertexPrecision)] =
+    &[("TwoFloat", VertexPrecision::TwoFloat), ("EyeF64", VertexPrecision::EyeF64)];
 const LOD: Shape = Shape {
     name: "Lod",
     fields: &[
@@ -38,19 +42,20 @@ const LOD: Shape = Shape {
         "merges_max",
         "level_max",
         "wanted_max",
+        "morph_s",
     ],
 };
 const VIEW: Shape = Shape {
     name: "View",
     fields: &["name", "field_of_view_deg", "yaw_deg", "pitch_deg", "near_m"],
 };
-const DEPTH: Shape = Shape { name: "Depth", fields: &["splits_m"] };
 const MEMORY: Shape = Shape { name: "Memory", fields: &["pages_mib"] };
 
 /// The procedural planet is made for bodies of at least this radius.
 const RADIUS_M_MIN: f64 = 500.0;
 const RADIUS_M_MAX: f64 = 1e9;
 const ARCHIVES_MAX: usize = 8;
+const IMAGERY_MAX: usize = 4;
 /// No system takes longer paths, few servers longer addresses.
 const LOCATION_MAX: usize = 4096;
 const TRIANGLES_MAX: u32 = 16_000_000;
@@ -58,14 +63,12 @@ const TRIANGLES_MAX: u32 = 16_000_000;
 const LEVELS: u8 = 56;
 const VIEWS_MAX: usize = 8;
 const VIEW_NAME_MAX: usize = 32;
-const SPLITS_MAX: usize = 7;
-const SPLITS_M: [f64; 2] = [30.0, 10_000.0];
 
 /// A view, where it was written, and what other settings must agree with.
-struct View<'t> {
-    group: Group<'t>,
+pub(crate) struct View<'t> {
+    pub group: Group<'t>,
     name: Option<String>,
-    near_m: Option<f64>,
+    pub near_m: Option<f64>,
     lens: Option<LensSettings>,
 }
 
@@ -74,11 +77,13 @@ pub(crate) fn scene<'t>(reader: &mut Reader<'t>, root: &'t Node) -> Option<Scene
     let scene = reader.group(root, "", &SCENE)?;
     let body = body(reader, &scene);
     let sources = sources(reader, &scene);
+    let imagery = imagery(reader, &scene);
     let sea = reader.switch(&scene, "sea", false);
     let sun = sun(reader, &scene);
     let lod = lod(reader, &scene);
     let views = views(reader, &scene);
-    let depth = depth(reader, &scene, &views);
+    let vertices = reader.choice(&scene, "vertices", PRECISIONS);
+    let depth = depth(reader, &scene, body, &views);
     let memory = memory(reader, &scene);
     Some(SceneSettings {
         body: body?,
@@ -86,8 +91,8 @@ pub(crate) fn scene<'t>(reader: &mut Reader<'t>, root: &'t Node) -> Option<Scene
         lod: lod?,
         views: views.into_iter().map(|view| view.lens).collect::<Option<_>>()?,
         depth: depth?,
-        vertices: VertexPrecision::TwoFloat,
-        imagery: Vec::new(),
+        vertices: vertices?,
+        imagery: imagery?,
         memory: memory?,
         sea: sea?,
         sun: sun?,
@@ -102,9 +107,9 @@ fn body<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Ellipsoid> {
     };
     let radii_m = RADIUS_M_MIN..=RADIUS_M_MAX;
     match reader.variant(node, "body", BODIES)? {
-        "Wgs84" => plain(reader, node, "body", Ellipsoid::WGS84),
-        "Moon" => plain(reader, node, "body", Ellipsoid::MOON),
-        "Mars" => plain(reader, node, "body", Ellipsoid::MARS),
+        "Wgs84" => reader.plain(node, "body", Ellipsoid::WGS84),
+        "Moon" => reader.plain(node, "body", Ellipsoid::MOON),
+        "Mars" => reader.plain(node, "body", Ellipsoid::MARS),
         "Sphere" => {
             let sphere = reader.group(node, "body", &SPHERE)?;
             let a_m = reader.required_number(&sphere, "radius_m", radii_m)?;
@@ -129,15 +134,6 @@ fn large_enough(reader: &mut Reader, group: &Group, body: Ellipsoid) -> Option<E
     let least_m = 3.0 * RADIUS_M_MIN / (3.0 - body.f);
     let allowed = format!("{least_m:.3} or more while body.f is {}", body.f);
     reader.out_of_range(group.get("a_m")?, "body.a_m", allowed);
-    None
-}
-
-/// The value of a variant without fields.
-fn plain<T>(reader: &mut Reader, node: &Node, path: &str, value: T) -> Option<T> {
-    if let Kind::Word(_) = node.kind {
-        return Some(value);
-    }
-    reader.wrong_type(node, path, "the name alone");
     None
 }
 
@@ -170,7 +166,7 @@ fn sources<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Vec<SourceS
             None => {}
         }
     }
-    counted(reader, scene, "sources", nodes.len(), [1, ARCHIVES_MAX + 1]);
+    reader.counted(scene, "sources", nodes.len(), [1, ARCHIVES_MAX + 1]);
     sources.into_iter().collect()
 }
 
@@ -183,6 +179,25 @@ fn archive(reader: &mut Reader, node: &Node, path: &str) -> Option<SourceSetting
             return None;
         }
     };
+    location(reader, text, path).map(|location| SourceSettings::Archive { location })
+}
+
+/// Archives of imagery, as they are written.
+fn imagery<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Vec<String>> {
+    if scene.get("imagery").is_none() {
+        return Some(Vec::new());
+    }
+    let nodes = reader.list(scene, "imagery", "a list of texts, [\"a path or an address\", …]")?;
+    let mut locations = Vec::new();
+    for (i, node) in nodes.iter().enumerate() {
+        locations.push(location(reader, node, &format!("imagery[{i}]")));
+    }
+    reader.counted(scene, "imagery", nodes.len(), [0, IMAGERY_MAX]);
+    locations.into_iter().collect()
+}
+
+/// The path or the address of an archive.
+fn location(reader: &mut Reader, text: &Node, path: &str) -> Option<String> {
     let Kind::Text(location) = &text.kind else {
         reader.wrong_type(text, path, "a text, the path or the address of an archive");
         return None;
@@ -190,7 +205,7 @@ fn archive(reader: &mut Reader, node: &Node, path: &str) -> Option<SourceSetting
     let sized = (1..=LOCATION_MAX).contains(&location.len());
     if sized && !location.contains(char::is_control) && (is_address(location) || is_path(location))
     {
-        return Some(SourceSettings::Archive { location: location.clone() });
+        return Some(location.clone());
     }
     let allowed = format!(
         "a path or an address http://… or https://…, of 1 to {LOCATION_MAX} bytes, none of them \
@@ -209,7 +224,7 @@ fn is_path(location: &str) -> bool {
 
 fn procedural<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<SourceSettings> {
     let seed = reader.whole(source, "seed", 0..=u64::MAX, 2029);
-    let style = style(reader, source);
+    let style = reader.choice(source, "style", STYLES);
     let relief = reader.number(source, "relief", 0.0..=10.0, 1.0);
     let finest_m = reader.number(source, "finest_m", 0.01..=1000.0, 0.15);
     let detail = reader.number(source, "detail", 0.0..=10.0, 1.0);
@@ -222,52 +237,6 @@ fn procedural<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<SourceS
     })
 }
 
-fn style<'t>(reader: &mut Reader<'t>, source: &Group<'t>) -> Option<Style> {
-    let Some(node) = source.get("style") else { return Some(Style::Earthlike) };
-    let path = source.path_of("style");
-    let style = match reader.variant(node, &path, STYLES)? {
-        "Earthlike" => Style::Earthlike,
-        _ => Style::Cratered,
-    };
-    plain(reader, node, &path, style)
-}
-
-/// Notes a list that is too short or too long.
-fn counted(
-    reader: &mut Reader,
-    group: &Group,
-    name: &str,
-    count: usize,
-    [least, most]: [usize; 2],
-) {
-    let Some(list) = group.get(name).filter(|_| !(least..=most).contains(&count)) else { return };
-    let items = if least == most { format!("{most}") } else { words(&(least..=most)) };
-    let what = FaultKind::OutOfRange {
-        found: format!("a list of {count}"),
-        allowed: format!("a list of {items}"),
-    };
-    reader.fault(list.at, group.path_of(name), what);
-}
-
-/// Outer `None`: a fault. Inner `None`: no sun.
-fn sun<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<Option<SunSettings>> {
-    let Some(node) = scene.get("sun") else { return Some(None) };
-    let inner = match &node.kind {
-        Kind::Word(name) if name == "None" => return Some(None),
-        Kind::Tuple(Some(name), items) if name == "Some" && items.len() == 1 => &items[0],
-        _ => {
-            let expected = "None or Some((latitude_deg: …, longitude_deg: …))";
-            reader.wrong_type(node, "sun", expected);
-            return None;
-        }
-    };
-    let sun = reader.group(inner, "sun", &SUN)?;
-    let latitude_deg = reader.required_number(&sun, "latitude_deg", -90.0..=90.0);
-    let longitude_deg = reader.required_number(&sun, "longitude_deg", -360.0..=360.0);
-    let below = Geodetic::from_degrees(latitude_deg?, longitude_deg?, 0.0);
-    Some(Some(SunSettings { direction: below.normal() }))
-}
-
 fn lod<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<LodSettings> {
     let lod = reader.part(scene, "lod", &LOD)?;
     let tolerance = reader.number(&lod, "tolerance_px", 0.01..=1e6, 1.0).map(Pixels);
@@ -277,6 +246,7 @@ fn lod<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<LodSettings> {
     let merges_max = reader.whole(&lod, "merges_max", 1..=65_536, 512);
     let level_max = level_max(reader, &lod, patch_depth);
     let wanted_max = reader.whole(&lod, "wanted_max", 1..=4096, 32);
+    let morph_s = reader.number(&lod, "morph_s", 0.0..=10.0, 0.25);
     Some(LodSettings {
         tolerance: tolerance?,
         triangles_max: triangles_max?,
@@ -285,7 +255,7 @@ fn lod<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<LodSettings> {
         merges_max: merges_max?,
         level_max: level_max?,
         wanted_max: wanted_max?,
-        morph_s: 0.0,
+        morph_s: morph_s?,
     })
 }
 
@@ -336,7 +306,7 @@ fn views<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Vec<View<'t>> {
     let Some(nodes) = nodes else {
         return vec![view(reader, Group::absent("views[0]".into(), scene.at))];
     };
-    counted(reader, scene, "views", nodes.len(), [1, VIEWS_MAX]);
+    reader.counted(scene, "views", nodes.len(), [1, VIEWS_MAX]);
     let mut views: Vec<View> = Vec::new();
     for (i, node) in nodes.iter().enumerate() {
         let Some(group) = reader.group(node, &format!("views[{i}]"), &VIEW) else { continue };
@@ -397,51 +367,6 @@ fn view_name(reader: &mut Reader, view: &Group) -> Option<String> {
     let allowed = format!("1 to {VIEW_NAME_MAX} of A-Z, a-z, 0-9, _ and -");
     reader.out_of_range(node, &path, allowed);
     None
-}
-
-fn depth<'t>(reader: &mut Reader<'t>, scene: &Group<'t>, views: &[View]) -> Option<DepthSettings> {
-    let depth = reader.part(scene, "depth", &DEPTH)?;
-    let splits_m = match reader.list(&depth, "splits_m", "a list of numbers") {
-        Some(nodes) => splits_m(reader, nodes),
-        None => SPLITS_M.map(Some).into(),
-    };
-    counted(reader, &depth, "splits_m", splits_m.len(), [0, SPLITS_MAX]);
-    if let Some(Some(first_m)) = splits_m.first() {
-        splits_beyond_near(reader, &depth, views, *first_m);
-    }
-    let splits_m = splits_m.into_iter().collect::<Option<_>>()?;
-    Some(DepthSettings { format: DepthFormat::D32F, order: DepthOrder::Reversed, splits_m })
-}
-
-fn splits_m(reader: &mut Reader, nodes: &[Node]) -> Vec<Option<f64>> {
-    let mut splits_m: Vec<Option<f64>> = Vec::new();
-    for (i, node) in nodes.iter().enumerate() {
-        let path = format!("depth.splits_m[{i}]");
-        let split_m = reader.number_in(node, &path, 0.001..=1e9);
-        if let (Some(split_m), Some(&before_m)) = (split_m, splits_m.iter().flatten().last())
-            && split_m <= before_m
-        {
-            reader.out_of_range(node, &path, format!("more than {before_m}, the one before it"));
-        }
-        splits_m.push(split_m);
-    }
-    splits_m
-}
-
-/// A split in front of a near plane would leave a depth range without depth. Whichever of the
-/// two was written is at fault; the splits if both were.
-fn splits_beyond_near(reader: &mut Reader, depth: &Group, views: &[View], first_m: f64) {
-    for view in views {
-        let Some(near_m) = view.near_m.filter(|near_m| *near_m >= first_m) else { continue };
-        let near_path = view.group.path_of("near_m");
-        if let Some(Node { kind: Kind::List(splits), .. }) = depth.get("splits_m") {
-            let allowed = format!("more than {near_m}, as {near_path} is");
-            reader.out_of_range(&splits[0], "depth.splits_m[0]", allowed);
-        } else if let Some(node) = view.group.get("near_m") {
-            let allowed = format!("less than {first_m}, the first of depth.splits_m by default");
-            reader.out_of_range(node, &near_path, allowed);
-        }
-    }
 }
 
 fn memory<'t>(reader: &mut Reader<'t>, scene: &Group<'t>) -> Option<MemorySettings> {

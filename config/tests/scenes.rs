@@ -8,7 +8,9 @@
 use overfly_config::{FaultKind, LoadError, PRESETS, Preset, load, preset, read};
 use overfly_core::datasource::procedural::Style;
 use overfly_core::geodesy::Ellipsoid;
-use overfly_core::settings::SceneSettings;
+use overfly_core::settings::{
+    DepthFormat, DepthOrder, SceneSettings, SunSettings, VertexPrecision,
+};
 
 fn settings(text: &str) -> SceneSettings {
     read(text, "scene.ron").unwrap_or_else(|faults| panic!("{faults}\nin {text}"))
@@ -55,10 +57,14 @@ fn earth_resolves_to_what_it_says() {
     assert!((earth.views[0].field_of_view.0 - std::f64::consts::FRAC_PI_3).abs() < 1e-15);
     assert_eq!((earth.views[0].yaw.0, earth.views[0].pitch.0), (0.0, 0.0));
     assert_eq!(earth.views[0].near_m, 0.1);
+    assert_eq!(earth.lod.morph_s, 0.25);
     assert_eq!(earth.depth.splits_m, [30.0, 10_000.0]);
+    assert_eq!(earth.depth.format, DepthFormat::D32F);
+    assert_eq!(earth.depth.order, DepthOrder::Reversed);
+    assert_eq!((earth.vertices, earth.imagery.len()), (VertexPrecision::TwoFloat, 0));
     assert_eq!(earth.memory.pages_bytes, 256 << 20);
     assert!(earth.sea);
-    let sun = earth.sun.unwrap().direction;
+    let Some(SunSettings::Fixed { direction: sun }) = earth.sun else { panic!("{:?}", earth.sun) };
     assert!((sun.length() - 1.0).abs() < 1e-15);
     assert!(sun.x < 0.0 && sun.y > 0.0 && (sun.z - 0.173_648).abs() < 1e-6);
 }
@@ -68,7 +74,9 @@ fn earth_spells_out_the_defaults() {
     let bare = settings("Scene(body: Wgs84)");
     assert_eq!((bare.sea, bare.sun), (false, None), "optional parts are absent");
     let earth = load("earth").unwrap();
-    let optional = SceneSettings { sea: earth.sea, sun: earth.sun, ..bare };
+    assert_eq!(bare.depth.splits_m, [0.0; 0], "one range is enough");
+    let depth = earth.depth.clone();
+    let optional = SceneSettings { sea: earth.sea, sun: earth.sun, depth, ..bare };
     assert_eq!(optional, earth);
     let hollow = "(body: Wgs84, sources: [Procedural()], sun: None, lod: (), views: [()], \
                   depth: (), memory: ())";
@@ -79,6 +87,7 @@ fn earth_spells_out_the_defaults() {
 fn moon_and_small_are_what_their_names_say() {
     let moon = load("moon").unwrap();
     assert_eq!((moon.body, moon.sea), (Ellipsoid::MOON, false));
+    assert_eq!(moon.depth.splits_m, [30.0, 10_000.0]);
     assert_eq!(moon.procedural_source().unwrap().style, Style::Cratered);
     let small = load("small").unwrap();
     assert_eq!((small.body, small.sea), (Ellipsoid { a_m: 1000.0, f: 0.0 }, true));
@@ -161,9 +170,6 @@ fn each_range_ends_where_the_format_says() {
         ("views: [(near_m: 0)]", "2:18: views[0].near_m", "0.001 to 1000000"),
         ("views: [(name: \"\")]", "2:16: views[0].name", "1 to 32 of A-Z"),
         ("views: [(name: \"../up\")]", "2:16: views[0].name", "1 to 32 of A-Z"),
-        ("depth: (splits_m: [1, 2, 3, 4, 5, 6, 7, 8])", "2:19: depth.splits_m", "list of 0 to 7"),
-        ("depth: (splits_m: [1, 2, 2])", "2:26: depth.splits_m[2]", "more than 2, the one before"),
-        ("depth: (splits_m: [inf])", "2:20: depth.splits_m[0]", "is inf, allowed is 0.001"),
         ("memory: (pages_mib: 3)", "2:21: memory.pages_mib", "4 to 65536"),
         ("lod: (tolerance_px: NaN)", "2:21: lod.tolerance_px", "is NaN, allowed is 0.01"),
         ("lod: (tolerance_px: 1e999)", "2:21: lod.tolerance_px", "is 1e999, allowed is 0.01"),
@@ -185,8 +191,16 @@ fn both_ends_of_each_range_are_allowed() {
         "lod: (tolerance_px: 1e6, triangles_max: 8, patch_depth: 0, level_max: 56, wanted_max: 1)",
         "lod: (triangles_max: 2048, patch_depth: 8, level_max: 48, wanted_max: 4096)",
         "views: [(field_of_view_deg: 179, yaw_deg: -360, pitch_deg: 90, near_m: 0.001)]",
-        "views: [(near_m: 1e6)], depth: (splits_m: [])",
-        "depth: (splits_m: [1, 2, 3, 4, 5, 6, 7])",
+        "views: [(near_m: 1e6)], depth: (ranges: [])",
+        "views: [(near_m: 1e6)]",
+        "views: [(near_m: 1e6)], depth: (format: D24, ranges: 8)",
+        "depth: (ranges: [1, 2, 3, 4, 5, 6, 7])",
+        "lod: (morph_s: 0)",
+        "lod: (morph_s: 10)",
+        "imagery: []",
+        "imagery: [\"a\", \"b/c\", \"http://d\", \"/e\"]",
+        "sun: Some(Clock(utc: \"1850-01-01T00:00:00Z\"))",
+        "sun: Some(Clock(utc: \"2149-12-31T23:59:59Z\", runs: false))",
         "memory: (pages_mib: 65536)",
     ] {
         settings(&format!("Scene(body: Moon, {setting})"));
@@ -208,7 +222,6 @@ fn wrong_types_say_what_was_found_and_expected() {
             "2:21: lod.tolerance_px: is the number 0x1, expected is a num",
         ),
         ("lod: (tolerance_px: [1])", "2:21: lod.tolerance_px: is a list, expected is a number"),
-        ("lod: (patch_depth: (4))", "2:20: lod.patch_depth: is a tuple, expected is a whole"),
         ("sources: Procedural()", "2:10: sources: is Procedural(…), expected is [Archive(\"…\"), "),
         ("sources: [Archive]", "2:11: sources[0]: is Archive, expected is Archive(\"a path or"),
         ("sources: [Archive()]", "2:11: sources[0]: is Archive(…), expected is Archive(\"a path"),
@@ -218,12 +231,10 @@ fn wrong_types_say_what_was_found_and_expected() {
         ("sources: [Procedural]", "2:11: sources[0]: is Procedural, expected is Procedural(seed"),
         ("sources: [3]", "2:11: sources[0]: is the number 3, expected is one of Archive, Pro"),
         ("sources: [Procedural(style: Earthlike())]", "2:29: sources[0].style: is Earthlike(…)"),
-        ("sun: (latitude_deg: 1)", "2:6: sun: is a struct, expected is None or Some(("),
+        ("sun: (latitude_deg: 1)", "2:6: sun: is a struct, expected is None, Some(("),
         ("sun: Some(1)", "2:11: sun: is the number 1, expected is Sun(latitude_deg"),
         ("views: [\"front\"]", "2:9: views[0]: is the text \"front\", expected is View("),
         ("views: [(name: 'c')]", "2:16: views[0].name: is the character 'c', expected is a text"),
-        ("depth: (splits_m: {1: 2})", "2:19: depth.splits_m: is a map, expected is a list"),
-        ("depth: (splits_m: [true])", "2:20: depth.splits_m[0]: is true, expected is a number"),
     ];
     for (setting, expected) in rows {
         let report = report_of(setting);
@@ -242,19 +253,6 @@ fn rules_between_settings_name_both() {
         (
             "lod: (patch_depth: 6, level_max: 51)",
             "2:34: lod.level_max: is 51, allowed is 0 to 50 while lod.patch_depth is 6",
-        ),
-        (
-            "views: [(near_m: 10)], depth: (splits_m: [5, 100])",
-            "2:43: depth.splits_m[0]: is 5, allowed is more than 10, as views[0].near_m is",
-        ),
-        (
-            "depth: (splits_m: [0.05])",
-            "2:20: depth.splits_m[0]: is 0.05, allowed is more than 0.1, as views[0].near_m is",
-        ),
-        (
-            "views: [(near_m: 30)]",
-            "2:18: views[0].near_m: is 30, allowed is less than 30, the first of depth.splits_m \
-             by default",
         ),
         (
             "views: [(name: \"a\"), (name: \"b\"), (name: \"a\")]",
@@ -286,9 +284,11 @@ fn one_fault_does_not_cause_another() {
     for (setting, count) in [
         ("lod: (patch_depth: 3, triangles_max: 9, level_max: 56)", 1),
         ("views: [3, (name: \"front\")]", 1),
-        ("views: [(near_m: -1)], depth: (splits_m: [0.002])", 1),
-        ("views: [(name: 3, near_m: 50)]", 2),
-        ("depth: (splits_m: [0.05, true])", 2),
+        ("views: [(near_m: -1)], depth: (ranges: [0.002])", 1),
+        ("views: [(near_m: -1)], depth: (format: D24)", 1),
+        ("depth: (format: D25, order: 3, ranges: No)", 3),
+        ("views: [(name: 3, near_m: 50)], depth: (ranges: [30])", 2),
+        ("depth: (ranges: [0.05, true])", 2),
         ("lod: 3, memory: 4, depth: 5", 3),
     ] {
         assert_eq!(report_of(setting).lines().count(), count, "{}", report_of(setting));
@@ -304,8 +304,8 @@ fn likely_names_are_suggested_and_others_listed() {
     let stranger = report_of("clouds: true");
     assert_eq!(
         stranger,
-        "2:1: clouds: unknown field clouds, known here: body, sources, sea, sun, lod, views, \
-         depth, memory"
+        "2:1: clouds: unknown field clouds, known here: body, sources, imagery, sea, sun, \
+         lod, views, vertices, depth, memory"
     );
     assert!(report("(body: Pluto)").contains("known here: Wgs84, Moon, Mars, Sphere, Ellipsoid"));
 }

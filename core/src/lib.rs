@@ -25,6 +25,8 @@ pub mod camera;
 
 pub mod scene;
 
+pub mod sun;
+
 pub mod settings;
 
 pub mod limits;

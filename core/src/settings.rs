@@ -143,11 +143,21 @@ pub struct MemorySettings {
     pub pages_bytes: u64,
 }
 
-/// The sun, where it stands for the whole flight.
+/// Where the sun stands; [`SunSettings::direction_at`] tells.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct SunSettings {
-    /// Body-fixed unit vector towards the sun.
-    pub direction: DVec3,
+pub enum SunSettings {
+    /// In one place for the whole flight.
+    Fixed {
+        /// Body-fixed unit vector towards the sun.
+        direction: DVec3,
+    },
+    /// As the Earth's year and day have it, over any body.
+    Clock {
+        /// UTC at the flight's time 0, in seconds since 1970-01-01T00:00:00Z without leap seconds.
+        start_unix_s: f64,
+        /// The sun goes on with the flight's time; else it stays where it is at the start.
+        runs: bool,
+    },
 }
 
 /// Whether an archive's location is an address on a server; all others are paths.
@@ -209,6 +219,10 @@ impl SceneSettings {
     }
 
     /// Every setting that can change a frame's bits, as (path, value), in a fixed order.
+    ///
+    /// Of `depth` that is where the ranges end, for patches are placed by range; numbers and order
+    /// in the depth buffer, `vertices`, `imagery` and `sun` are only the renderer's, so a
+    /// recording replays with others. Ranges that follow from a format are listed as resolved.
     pub fn listing(&self) -> Vec<(String, String)> {
         let mut list = vec![
             ("body.a_m".into(), format!("{:?}", self.body.a_m)),
@@ -328,6 +342,24 @@ mod tests {
     fn archives_alone_have_neither_planet_nor_detail() {
         let scene = scene(vec![archive("alps.pmtiles")]);
         assert_eq!((scene.procedural_source(), scene.detail()), (None, 0.0));
+    }
+
+    #[test]
+    fn what_only_a_renderer_uses_is_not_listed_and_where_ranges_end_is() {
+        let before = scene(vec![PLANET]);
+        let mut drawn_otherwise = before.clone();
+        drawn_otherwise.depth.format = DepthFormat::D24;
+        drawn_otherwise.depth.order = DepthOrder::Forward;
+        drawn_otherwise.vertices = VertexPrecision::EyeF64;
+        drawn_otherwise.imagery = vec!["blue.pmtiles".into()];
+        drawn_otherwise.sun = Some(SunSettings::Clock { start_unix_s: 0.0, runs: true });
+        assert_eq!(drawn_otherwise.digest(), before.digest());
+        let mut ranges = before.clone();
+        ranges.depth.splits_m = vec![30.0];
+        let mut morphing = before.clone();
+        morphing.lod.morph_s = 0.25;
+        assert_ne!(ranges.digest(), before.digest());
+        assert_ne!(morphing.digest(), before.digest());
     }
 
     #[test]

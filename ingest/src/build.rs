@@ -549,12 +549,12 @@ fn digest(content: &mut Chain, bytes: &[u8]) {
     }
 }
 
-fn coord(key: PageKey) -> TileCoord {
+pub(crate) fn coord(key: PageKey) -> TileCoord {
     let (z, x, y) = key.zxy();
     TileCoord::new(z, x, y).expect("a page is a tile")
 }
 
-fn add(
+pub(crate) fn add(
     writer: &mut PmTilesStreamWriter<&File>,
     key: PageKey,
     bytes: &[u8],

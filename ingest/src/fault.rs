@@ -55,6 +55,20 @@ pub enum IngestError {
         /// What is wrong with it.
         fault: TileFault,
     },
+    /// Every pixel of a picture is transparent.
+    NoColour {
+        /// The picture.
+        path: PathBuf,
+    },
+    /// The tiles of a finished archive hold other texels than it states.
+    OtherContent {
+        /// The archive.
+        path: PathBuf,
+        /// The hash that it states.
+        stated: u64,
+        /// The hash of what it holds.
+        found: u64,
+    },
     /// It was asked to stop.
     Stopped,
 }
@@ -95,6 +109,14 @@ impl fmt::Display for IngestError {
             Self::Archive { path, error } => write!(f, "{}: {error}", path.display()),
             Self::ReadBack(error) => error.fmt(f),
             Self::Tile { key, fault } => write!(f, "tile {key:?}: {fault}"),
+            Self::NoColour { path } => {
+                write!(f, "{}: there is nothing to see: every pixel's alpha is 0", path.display())
+            }
+            Self::OtherContent { path, stated, found } => write!(
+                f,
+                "{}: its tiles have content {found:016x}, and it states {stated:016x}",
+                path.display()
+            ),
             Self::Stopped => f.write_str("stopped; what was there before is as it was"),
         }
     }

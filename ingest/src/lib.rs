@@ -1,6 +1,6 @@
-//! Real elevation into terrain archives.
+//! Real elevation and imagery into archives.
 //!
-//! In:    rasters of heights in many formats.
+//! In:    rasters of heights in many formats; pictures of a body.
 //! Out:   a PMTiles archive of octahedral tiles.
 //! Keeps: nothing.
 //! Not here: reading archives (`overfly_archive`), making pages from tiles (`overfly_core`).
@@ -11,6 +11,7 @@ pub mod build;
 pub mod fault;
 pub mod fit;
 pub mod geoid;
+pub mod imagery;
 pub mod marks;
 pub mod pyramid;
 pub mod raster;
@@ -20,4 +21,5 @@ pub mod verify;
 
 pub use build::{BuildOptions, Progress, Report, build};
 pub use fault::IngestError;
+pub use imagery::{ImageryOptions, ImageryReport, build_imagery, verify_imagery};
 pub use verify::{Difference, verify};

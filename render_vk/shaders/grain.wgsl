@@ -1,90 +1,141 @@
-// Grain of the ground: value noise on a lattice that is fixed to the body, from 2 km to 12 cm.
+// Grain of the ground: a texture of noise in five sizes, fixed to the body, from 2 cm to 20 km.
+//
+// Each size lies on two of the three coordinate planes: those that the ground faces most. Its mip
+// levels end it where pixels are too wide for it. Source: Quílez, "Biplanar mapping", 2020.
 
-// ---- Octaves: each has cells of a quarter of the last one's size, fine ones of half ----
-const TILE_M: f32 = 4096.0;       // cells count from tiles: exact however far from the centre
-const COARSEST_M: f32 = 2048.0;
-const OCTAVES: i32 = 12;
-const FINE_M: f32 = 40.0;         // cells below this are `fine`, above `broad`
-const BUMPY_M: f32 = 40.0;        // cells above this tilt the ground the less
-const SEEN_PX: vec2<f32> = vec2<f32>(2.0, 4.5);      // a cell of so many pixels: none, all of it
-const BROAD: f32 = 0.62;          // share of an octave
-const FINE: f32 = 0.42;
-const TILT: f32 = 0.15;
-const SHIFT: vec3<f32> = vec3<f32>(0.37, 0.61, 0.83);        // of each octave, so that no two align
-const RIPPLES: vec3<f32> = vec3<f32>(2.0, -1.5, 1.75);       // waves a metre; whole in a tile
-const RIPPLES_M: f32 = 0.33;
+@group(0) @binding(1) var detail: texture_2d<f32>; // two values around 0, gradient of the first
+@group(0) @binding(2) var detail_sampler: sampler;
 
-struct Noise {
-    value: vec2<f32>,             // two of one cost, each -1 to 1
-    gradient: vec3<f32>,          // of the first, per cell
+// ---- Sizes, widest first ----
+//
+// A size repeats after `period_m`, a power of two, so that the eye's part is exact however far the
+// centre is. Turned and shrunk by a whole complex number it still does: no two sizes align.
+struct Size {
+    period_m: f32,
+    turn: vec2<f32>,
+    broad: f32,                   // shares of `Grain`
+    fine: f32,
+    tilt: f32,
 }
 
+fn size_of(index: i32) -> Size {
+    // A table would be read lane by lane on software devices.
+    let odd = (index & 1) == 1;
+    let n = f32(index);
+    var out: Size;
+    out.period_m = exp2(19.0 - 4.0 * n);
+    out.turn = select(vec2<f32>(1.0, 3.0), vec2<f32>(3.0, 2.0), odd);
+    out.broad = clamp(2.6 - n, 0.0, 1.0);
+    out.fine = 0.85 * clamp(n - 1.2, 0.0, 1.0);
+    out.tilt = 0.65 * clamp(0.5 * n - 0.4, 0.0, 1.0);
+    return out;
+}
+
+const SIZES: i32 = 5;
+const ON_THE_BODY: i32 = 2;       // so many sizes ignore the ground's slope
+
+const SEEN: vec2<f32> = vec2<f32>(0.10, 0.05);  // pixel over tile: none of a size, all of it
+const PATCHY: vec2<f32> = vec2<f32>(0.9, 0.8);  // strength of a size, and how the last one bends it
+const FACES: f32 = 0.57735027;    // a plane that faces less than this takes no part
+const LEAST: f32 = 0.7;       // the second plane's weight over the first's that is left out
+const RIPPLES: vec3<f32> = vec3<f32>(2.0, -1.5, 1.75);       // waves a metre; whole in 64 m
+const RIPPLES_M: f32 = 0.33;
+const RIPPLED_PX: vec2<f32> = vec2<f32>(2.0, 4.5);           // half a wave: none of it, all of it
+
 struct Grain {
-    broad: vec2<f32>,             // around 0, mostly within -1 to 1
+    broad: vec2<f32>,             // around 0, mostly within -1 to 1: 60 m and more
     fine: vec2<f32>,
     tilt: vec3<f32>,              // gradient of the bumps, no unit
     ripple: f32,                  // -1 to 1
     ripple_tilt: vec3<f32>,
 }
 
-// Two values of 12 bits for a corner of the lattice: one round of mixing is enough for the eye.
-fn corner(at: u32) -> vec2<f32> {
-    let h = (at ^ (at >> 15u)) * 0x846ca68bu;
-    return vec2<f32>(f32((h >> 8u) & 0xfffu), f32(h >> 20u));
+// The two planes that a direction faces most, by the axes across them.
+struct Planes {
+    axis: vec2<u32>,
+    weight: vec2<f32>,            // squares sum to 1: so noise keeps its strength
 }
 
-fn noise(cell: vec3<i32>, f: vec3<f32>) -> Noise {
-    let factor = vec3<u32>(0x9e3779b1u, 0x85ebca77u, 0xc2b2ae3du);
-    let low = vec3<u32>(cell) * factor;
-    let high = low + factor;
-    let v000 = corner(low.x ^ low.y ^ low.z);
-    let v100 = corner(high.x ^ low.y ^ low.z);
-    let v010 = corner(low.x ^ high.y ^ low.z);
-    let v110 = corner(high.x ^ high.y ^ low.z);
-    let v001 = corner(low.x ^ low.y ^ high.z);
-    let v101 = corner(high.x ^ low.y ^ high.z);
-    let v011 = corner(low.x ^ high.y ^ high.z);
-    let v111 = corner(high.x ^ high.y ^ high.z);
-    let s = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
-    let ds = 30.0 * f * f * (f * (f - 2.0) + 1.0);
-    let x00 = mix(v000, v100, s.x);
-    let x10 = mix(v010, v110, s.x);
-    let x01 = mix(v001, v101, s.x);
-    let x11 = mix(v011, v111, s.x);
-    let y0 = mix(x00, x10, s.y);
-    let y1 = mix(x01, x11, s.y);
-    let dx0 = mix(v100.x - v000.x, v110.x - v010.x, s.y);
-    let dx1 = mix(v101.x - v001.x, v111.x - v011.x, s.y);
-    let dx = mix(dx0, dx1, s.z);
-    let dy = mix(x10.x - x00.x, x11.x - x01.x, s.z);
-    let unit = 2.0 / 4095.0;
-    var out: Noise;
-    out.value = mix(y0, y1, s.z) * unit - 1.0;
-    out.gradient = vec3<f32>(dx, dy, y1.x - y0.x) * ds * unit;
+fn planes_of(direction: vec3<f32>) -> Planes {
+    let m = abs(direction);
+    let first = select(select(2u, 1u, m.y > m.z), 0u, m.x > max(m.y, m.z));
+    let last = select(select(2u, 1u, m.y <= m.z), 0u, m.x <= min(m.y, m.z));
+    let middle = m.x + m.y + m.z - max(m.x, max(m.y, m.z)) - min(m.x, min(m.y, m.z));
+    let most = max(max(m.x, max(m.y, m.z)) - FACES, 1e-4);
+    let weight = vec2<f32>(most, max(middle - FACES - LEAST * most, 0.0));
+    var out: Planes;
+    out.axis = vec2<u32>(first, 3u - first - last);
+    out.weight = normalize(weight);
     return out;
 }
 
-// The grain `offset` metres from the eye, where a pixel covers `footprint_m` of ground.
-// Octaves are left out before their cells are smaller than pixels, so that nothing shimmers.
-fn grain_at(offset: vec3<f32>, footprint_m: f32) -> Grain {
-    let tile = floor(view.eye_hi / TILE_M);
-    let p = (view.eye_hi - tile * TILE_M) + view.eye_lo + offset;
-    var out: Grain;
-    var cell_m = COARSEST_M;
-    for (var i = 0; i < OCTAVES; i++) {
-        let seen = smoothstep(SEEN_PX.x, SEEN_PX.y, cell_m / footprint_m);
-        if seen <= 0.0 { break; }
-        let at = p / cell_m + SHIFT * f32(i);
-        let base = floor(at);
-        let cell = vec3<i32>(tile) * i32(TILE_M / cell_m) + vec3<i32>(base);
-        let n = noise(cell + vec3<i32>(i * 0x3c6ef35), at - base);
-        let is_fine = select(0.0, seen, cell_m < FINE_M);
-        out.broad += n.value * ((seen - is_fine) * BROAD);
-        out.fine += n.value * (is_fine * FINE);
-        out.tilt += n.gradient * (seen * TILT * min(BUMPY_M / cell_m, 1.0));
-        cell_m *= select(0.5, 0.25, cell_m > FINE_M);
+fn on_plane(p: vec3<f32>, axis: u32) -> vec2<f32> {
+    return select(select(p.xy, p.zx, axis == 1u), p.yz, axis == 0u);
+}
+
+fn off_plane(p: vec2<f32>, axis: u32) -> vec3<f32> {
+    let y = vec3<f32>(p.y, 0.0, p.x);
+    return select(select(vec3<f32>(p, 0.0), y, axis == 1u), vec3<f32>(0.0, p), axis == 0u);
+}
+
+fn turned(p: vec2<f32>, by: vec2<f32>) -> vec2<f32> {
+    return vec2<f32>(by.x * p.x - by.y * p.y, by.y * p.x + by.x * p.y);
+}
+
+// One size at a place: two values and a gradient. `dx` and `dy` lead to neighbouring pixels.
+struct Layer {
+    value: vec2<f32>,
+    tilt: vec3<f32>,
+}
+
+fn layer_at(size: Size, planes: Planes, p: vec3<f32>, dx: vec3<f32>, dy: vec3<f32>) -> Layer {
+    var out: Layer;
+    // A loop, because software devices skip what is beyond its end, but no branch.
+    let count = select(1, 2, planes.weight.y > 0.0);
+    for (var i = 0; i < count; i++) {
+        let axis = select(planes.axis.x, planes.axis.y, i == 1);
+        let weight = select(planes.weight.x, planes.weight.y, i == 1);
+        let at = turned(on_plane(p, axis), size.turn) + vec2<f32>(0.37, 0.61) * f32(axis);
+        let along_x = turned(on_plane(dx, axis), size.turn);
+        let along_y = turned(on_plane(dy, axis), size.turn);
+        let bytes = textureSampleGrad(detail, detail_sampler, at, along_x, along_y);
+        let texel = bytes * (255.0 / 127.0) - 128.0 / 127.0;
+        out.value += weight * texel.xy;
+        let back = turned(texel.zw, vec2<f32>(size.turn.x, -size.turn.y)) / length(size.turn);
+        out.tilt += weight * off_plane(back, axis);
     }
-    let rippled = smoothstep(SEEN_PX.x, SEEN_PX.y, 0.5 * RIPPLES_M / footprint_m);
+    return out;
+}
+
+// The grain `offset` metres from the eye; `dx` and `dy` lead to the pixel's neighbours.
+fn grain_at(
+    offset: vec3<f32>,
+    dx: vec3<f32>,
+    dy: vec3<f32>,
+    normal: vec3<f32>,
+    up: vec3<f32>,
+) -> Grain {
+    let footprint_m = sqrt(length(cross(dx, dy)));
+    var planes = planes_of(up);
+    var out: Grain;
+    var bend = 0.0;
+    for (var i = 0; i < SIZES; i++) {
+        let size = size_of(i);
+        let pixel = footprint_m * length(size.turn) / size.period_m;
+        let seen = 1.0 - smoothstep(SEEN.y, SEEN.x, pixel);
+        if seen <= 0.0 { break; }
+        if i == ON_THE_BODY { planes = planes_of(normal); }
+        let p = fract(view.eye_hi / size.period_m) + (view.eye_lo + offset) / size.period_m;
+        let layer = layer_at(size, planes, p, dx / size.period_m, dy / size.period_m);
+        let strength = seen * max(PATCHY.x + PATCHY.y * bend, 0.2);
+        out.broad += layer.value * (strength * size.broad);
+        out.fine += layer.value * (strength * size.fine);
+        out.tilt += layer.tilt * (strength * size.tilt);
+        bend = layer.value.y;
+    }
+    let wide = max(length(dx), length(dy));
+    let rippled = smoothstep(RIPPLED_PX.x, RIPPLED_PX.y, 0.5 * RIPPLES_M / wide);
+    let p = fract(view.eye_hi / 64.0) * 64.0 + (view.eye_lo + offset);
     let phase = 2.0 * PI * fract(dot(RIPPLES, p)) + 5.0 * out.fine.y;
     out.ripple = rippled * sin(phase);
     out.ripple_tilt = (rippled * RIPPLES_M * cos(phase)) * RIPPLES;

@@ -164,6 +164,8 @@ fn water(point: Point, up: vec3<f32>, ray: vec3<f32>, light: vec3<f32>) -> vec3<
 fn fragment(point: Point) -> @location(0) vec4<f32> {
     let up = up_at(point.offset);
     let normal = normalize(point.normal);
+    let dx = dpdx(point.offset);
+    let dy = dpdy(point.offset);
     let distance_m = length(point.offset);
     let ray = point.offset / distance_m;
     var light: vec3<f32>;
@@ -172,15 +174,14 @@ fn fragment(point: Point) -> @location(0) vec4<f32> {
     } else {
         let slope = clamp(1.0 - dot(normal, up), 0.0, 1.0);
         let pixel_m = distance_m * view.pixel_rad;
-        // Ground seen at a slant is squeezed in one direction only: between the two footprints.
-        let facing = max(-dot(ray, normal), 0.02);
-        let grain = grain_at(point.offset, pixel_m * pow(facing, -0.75));
+        let grain = grain_at(point.offset, dx, dy, normal, up);
         var cover: Cover;
         if view.air != 0.0 {
             cover = land(point, slope, grain, pixel_m);
         } else {
             cover = regolith(point.layers, grain);
         }
+        cover.albedo = draped(point, cover.albedo, grain);
         let tilt = grain.tilt * cover.rough + grain.ripple_tilt * (cover.rippled * RIPPLED);
         light = cover.albedo * lit(tilted(normal, tilt), up, point.height_m);
     }

@@ -113,6 +113,11 @@ pub enum DrawError {
         /// Vertices of the arena that have one.
         found: usize,
     },
+    /// The arena has drapes and the renderer no imagery, or the other way round.
+    Drapes {
+        /// Slots of the arena that have one.
+        found: usize,
+    },
     /// The new size is beyond what the device can draw.
     Resize(Box<StartError>),
     /// The depth is kept only where the settings ask for it.
@@ -228,6 +233,12 @@ impl fmt::Display for DrawError {
                 write!(
                     f,
                     "the arena has {found} morphs, which is not what the renderer is made for"
+                )
+            }
+            Self::Drapes { found } => {
+                write!(
+                    f,
+                    "the arena has {found} drapes, which is not what the renderer is made for"
                 )
             }
             Self::Resize(error) => error.fmt(f),

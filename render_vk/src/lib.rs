@@ -18,8 +18,10 @@
 //! other. A window gets a copy of the finished picture.
 #![deny(unsafe_code)]
 
+mod detail;
 mod error;
 mod eye;
+mod imagery;
 mod matrices;
 mod overlay;
 mod passes;
@@ -42,6 +44,7 @@ pub use crate::settings::RendererSettings;
 pub use crate::vk::instance::{DeviceInfo, devices, layers};
 pub use crate::vk::swapchain::Presented;
 
+use crate::imagery::Imagery;
 use crate::matrices::{Fixed, ViewTerms};
 use crate::overlay::OverlayVertex;
 use crate::passes::{PassInfo, Passes};
@@ -55,6 +58,7 @@ use crate::vk::{Device, commands::OneOff, transfer};
 use gpu_allocator::MemoryLocation;
 use overfly_core::frame::data::DeviceTotals;
 use overfly_core::geodesy::narrow;
+use overfly_core::mesh::drape::NewTile;
 use overfly_core::mesh::{Patches, topology};
 use overfly_core::settings::DepthFormat;
 use overfly_jobs::Team;
@@ -91,6 +95,7 @@ pub struct Renderer {
     targets: Targets,
     passes: Passes,
     arena: Arena,
+    imagery: Option<Imagery>,
     one_off: OneOff,
     frames: Vec<Frame>,
     next_frame: usize,
@@ -139,8 +144,11 @@ impl Renderer {
         let range_passes = RangePasses::new(&device, settings.depth_format, settings.keep_depth)?;
         let targets = Targets::new(&device, &range_passes, settings.size_px)?;
         let info = PassInfo { device: &device, passes: &range_passes, settings };
-        let passes = Passes::new(&info)?;
+        let passes = Passes::new(&info, &mut one_off)?;
         let arena = Arena::new(&device, &mut one_off, settings)?;
+        let drapes = passes.imagery.as_ref().zip(arena.drapes.as_ref());
+        let imagery = drapes.map(|drapes| Imagery::new(&device, &mut one_off, drapes));
+        let imagery = imagery.transpose()?;
         let frames = (0..settings.frames_in_flight)
             .map(|index| Frame::new(&device, &arena, (&passes, settings), index))
             .collect::<Result<_, _>>()?;
@@ -157,6 +165,7 @@ impl Renderer {
             targets,
             passes,
             arena,
+            imagery,
             one_off,
             frames,
             next_frame: 0,
@@ -178,6 +187,14 @@ impl Renderer {
     /// be called every frame, drawn or not. Slots beyond the arena are ignored.
     pub fn note_built(&mut self, slots: &[u32]) {
         self.arena.mark(slots);
+    }
+
+    /// Tells which tiles of imagery are new in their layers, as [`Self::note_built`] of patches. A
+    /// renderer that comes late is told of all that the terrain has.
+    pub fn note_tiles(&mut self, tiles: &[NewTile]) {
+        if let Some(imagery) = &mut self.imagery {
+            imagery.note(tiles);
+        }
     }
 
     /// Changes the size of the pictures, and tells the window's chain of it. Waits for all
@@ -230,6 +247,7 @@ impl Renderer {
         self.next_frame = (frame + 1) % self.frames.len();
         self.frames[frame].fence.wait()?;
         let uploaded = self.stage(frame, picture.patches)?;
+        self.stage_tiles(frame)?;
         let settings = &self.settings;
         let info = PassInfo { device: &self.device, passes: &self.range_passes, settings };
         let is_debug = picture.show != Show::Shaded;
@@ -259,6 +277,7 @@ impl Renderer {
             targets: &self.targets,
             passes: &self.passes,
             arena: &self.arena,
+            imagery: self.imagery.as_ref(),
             picture,
             lists,
         };
@@ -296,6 +315,16 @@ impl Renderer {
         }
     }
 
+    /// As [`Self::stage`], for tiles of imagery.
+    fn stage_tiles(&mut self, frame: usize) -> Result<(), DrawError> {
+        let Some(imagery) = &mut self.imagery else { return Ok(()) };
+        let tiles = self.frames[frame].tiles.as_mut().expect("made where there is imagery");
+        while imagery.stage(tiles) {
+            self.one_off.run(|device, buffer| imagery.record(device, buffer, tiles))?;
+        }
+        Ok(())
+    }
+
     fn check_draw(&self, picture: &Picture<'_>) -> Result<(), DrawError> {
         let (settings, view, patches) = (&self.settings, picture.view, picture.patches);
         if view.camera.size_px != settings.size_px {
@@ -313,6 +342,9 @@ impl Renderer {
         }
         if settings.morphs() == patches.morphs.is_empty() {
             return Err(DrawError::Morphs { found: patches.morphs.len() });
+        }
+        if settings.imagery == patches.drapes.is_empty() {
+            return Err(DrawError::Drapes { found: patches.drapes.len() });
         }
         let longest = view.ranges.iter().map(|range| range.patches.len()).max().unwrap_or(0);
         if longest > settings.patches_max as usize {

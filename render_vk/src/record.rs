@@ -11,6 +11,7 @@
 //! recorded follows from the draws alone.
 
 use crate::error::{DrawError, Fault, failed};
+use crate::imagery::{Imagery, TileStaging};
 use crate::matrices::RangeTerms;
 use crate::passes::terrain::{MORPHS, PLACES, VERTICES};
 use crate::passes::{Passes, VIEW_STAGES};
@@ -41,6 +42,7 @@ pub(crate) struct Scene<'a> {
     pub(crate) targets: &'a Targets,
     pub(crate) passes: &'a Passes,
     pub(crate) arena: &'a Arena,
+    pub(crate) imagery: Option<&'a Imagery>,
     pub(crate) picture: &'a Picture<'a>,
     /// Slots to draw in each range.
     pub(crate) lists: &'a [&'a [u32]],
@@ -66,6 +68,7 @@ pub(crate) struct Frame {
     pub(crate) fence: Fence,
     pub(crate) staging: Buffer,
     pub(crate) rings: Rings,
+    pub(crate) tiles: Option<TileStaging>,
     pool: Pool,
     primary: vk::CommandBuffer,
     sky: vk::CommandBuffer,
@@ -92,6 +95,7 @@ impl Frame {
             fence: Fence::new(device, &name)?,
             staging: arena.staging(device, &format!("{name}, staging"))?,
             rings: Rings::new(device, passes, settings, &name)?,
+            tiles: settings.imagery.then(|| TileStaging::new(device, &name)).transpose()?,
             primary: pool.buffer(vk::CommandBufferLevel::PRIMARY)?,
             sky: pool.buffer(vk::CommandBufferLevel::SECONDARY)?,
             overlay: pool.buffer(vk::CommandBufferLevel::SECONDARY)?,
@@ -150,6 +154,9 @@ impl Frame {
         let primary = self.primary;
         begin(scene.device, primary)?;
         copies.record(scene.device, primary, (&self.staging, scene.arena));
+        if let (Some(imagery), Some(tiles)) = (scene.imagery, &self.tiles) {
+            imagery.record(scene.device, primary, tiles);
+        }
         let a_lane = self.chunks.len().div_ceil(LANES).max(1);
         let farthest = scene.lists.len().saturating_sub(1);
         for range in (0..=farthest).rev() {
@@ -261,6 +268,16 @@ fn bind(
         device.cmd_bind_descriptor_sets(buffer, graphics, layout, 0, &view, &[]);
         if let Some(infos) = rings.infos_set() {
             device.cmd_bind_descriptor_sets(buffer, graphics, layout, 1, &[infos.handle], &[]);
+        }
+        if let Some(imagery) = scene.imagery {
+            device.cmd_bind_descriptor_sets(
+                buffer,
+                graphics,
+                layout,
+                2,
+                &[imagery.set.handle],
+                &[],
+            );
         }
         device.cmd_push_constants(buffer, layout, VIEW_STAGES, 0, bytes_of(&[terms]));
     }

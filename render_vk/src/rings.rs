@@ -70,8 +70,11 @@ impl Rings {
             let usage = vk::BufferUsageFlags::VERTEX_BUFFER;
             rows("places", vertices, size_of::<[f32; 3]>(), usage)
         });
+        let detail = &passes.detail;
+        let (image, sampler) = (detail.image.view, detail.sampler.handle);
+        let all = [Resource::Buffer(&view), Resource::Image(image), Resource::Sampler(sampler)];
         Ok(Self {
-            view_set: Set::new(&passes.view, &[Resource::Buffer(&view)])?,
+            view_set: Set::new(&passes.view, &all)?,
             draws,
             places: places.transpose()?,
             overlay: None,

@@ -32,6 +32,8 @@ pub struct RendererSettings {
     /// How long a vertex takes to its own place in seconds, as in the scene's settings; 0: no
     /// vertex moves, and the arena has no morphs.
     pub morph_s: f64,
+    /// Whether imagery lies over the ground: the arena has drapes.
+    pub imagery: bool,
     /// Error on the screen that may stay, for the debug view of errors.
     pub tolerance_px: f64,
     /// Keeps the depth of the nearest range for [`crate::Renderer::read_depth`].
@@ -54,6 +56,7 @@ impl RendererSettings {
             depth_order: scene.depth.order,
             vertices: scene.vertices,
             morph_s: scene.lod.morph_s,
+            imagery: !scene.imagery.is_empty(),
             tolerance_px: scene.lod.tolerance.0,
             keep_depth: false,
             frames_in_flight: 2,

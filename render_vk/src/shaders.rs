@@ -13,28 +13,44 @@ macro_rules! module {
     };
 }
 
-/// Ground, `vertex`: how vertices are placed, whether they move, and whether for a debug view.
-pub(crate) fn ground(placed: VertexPrecision, morphs: bool, debug: bool) -> Vec<u32> {
-    match (placed, morphs, debug) {
-        (VertexPrecision::TwoFloat, false, false) => module!("ground_two_float"),
-        (VertexPrecision::TwoFloat, true, false) => module!("ground_two_float_morph"),
-        (VertexPrecision::TwoFloat, false, true) => module!("ground_two_float_debug"),
-        (VertexPrecision::TwoFloat, true, true) => module!("ground_two_float_morph_debug"),
-        (VertexPrecision::EyeF64, false, false) => module!("ground_eye"),
-        (VertexPrecision::EyeF64, true, false) => module!("ground_eye_morph"),
-        (VertexPrecision::EyeF64, false, true) => module!("ground_eye_debug"),
-        (VertexPrecision::EyeF64, true, true) => module!("ground_eye_morph_debug"),
+/// For whom the ground is drawn.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Ground {
+    /// As one sees it.
+    Plain,
+    /// As one sees it, under imagery.
+    Draped,
+    /// Debug views.
+    Debug,
+}
+
+/// Ground, `vertex`: how vertices are placed, whether they move, and for whom.
+pub(crate) fn ground(placed: VertexPrecision, morphs: bool, ground: Ground) -> Vec<u32> {
+    use Ground::{Debug, Draped, Plain};
+    use VertexPrecision::{EyeF64, TwoFloat};
+    match (placed, morphs, ground) {
+        (TwoFloat, false, Plain) => module!("ground_two_float"),
+        (TwoFloat, true, Plain) => module!("ground_two_float_morph"),
+        (TwoFloat, false, Draped) => module!("ground_two_float_drape"),
+        (TwoFloat, true, Draped) => module!("ground_two_float_morph_drape"),
+        (TwoFloat, false, Debug) => module!("ground_two_float_debug"),
+        (TwoFloat, true, Debug) => module!("ground_two_float_morph_debug"),
+        (EyeF64, false, Plain) => module!("ground_eye"),
+        (EyeF64, true, Plain) => module!("ground_eye_morph"),
+        (EyeF64, false, Draped) => module!("ground_eye_drape"),
+        (EyeF64, true, Draped) => module!("ground_eye_morph_drape"),
+        (EyeF64, false, Debug) => module!("ground_eye_debug"),
+        (EyeF64, true, Debug) => module!("ground_eye_morph_debug"),
     }
 }
 
-/// Ground as one sees it: `fragment`.
-pub(crate) fn terrain() -> Vec<u32> {
-    module!("terrain")
-}
-
-/// Ground in debug views: `fragment`.
-pub(crate) fn debug() -> Vec<u32> {
-    module!("debug")
+/// Ground: `fragment`.
+pub(crate) fn terrain(ground: Ground) -> Vec<u32> {
+    match ground {
+        Ground::Plain => module!("terrain"),
+        Ground::Draped => module!("terrain_drape"),
+        Ground::Debug => module!("debug"),
+    }
 }
 
 /// Sky: `vertex`, `fragment`.
@@ -83,14 +99,15 @@ mod tests {
     #[test]
     fn every_float_result_of_every_shader_is_decorated_once() {
         use VertexPrecision::{EyeF64, TwoFloat};
-        let placed = |placed, least| {
-            let all = [(false, false), (false, true), (true, false), (true, true)];
-            all.map(|(morphs, debug)| (ground(placed, morphs, debug), least))
-        };
-        let others =
-            [(terrain(), 100), (debug(), 30), (sky(), 50), (overlay(), 5), (self_test(), 8)];
-        let all = [&placed(TwoFloat, 20)[..], &placed(EyeF64, 10), &others].concat();
-        for (module, least) in all {
+        let all = [Ground::Plain, Ground::Draped, Ground::Debug];
+        let mut modules = vec![(sky(), 50), (overlay(), 5), (self_test(), 8)];
+        modules.extend(all.map(|ground| (terrain(ground), 30)));
+        for (placed, morphs) in
+            [(TwoFloat, false), (TwoFloat, true), (EyeF64, false), (EyeF64, true)]
+        {
+            modules.extend(all.map(|to| (ground(placed, morphs, to), 10)));
+        }
+        for (module, least) in modules {
             let (results, decorated) = float_results_and_decorated(&module);
             assert!(results.len() >= least, "only {} float operations", results.len());
             assert_eq!(results, decorated);

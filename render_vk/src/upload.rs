@@ -2,7 +2,7 @@
 //!
 //! In:    slots built by the frame, the patch arena of core.
 //! Out:   staged vertices and the copies that bring them to the device.
-//! Keeps: buffers of vertices, morphs and indices, one bit a slot.
+//! Keeps: buffers of vertices, morphs, drapes and indices, one bit a slot.
 //! Not here: recording the copies (`record`).
 
 use crate::error::Fault;
@@ -11,6 +11,7 @@ use crate::vk::buffer::{Buffer, BufferInfo, bytes_of};
 use crate::vk::{Device, commands::OneOff, transfer};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
+use overfly_core::mesh::drape::PatchDrape;
 use overfly_core::mesh::{PatchMorph, PatchVertex, Patches, topology};
 use std::sync::Arc;
 
@@ -22,6 +23,8 @@ pub(crate) struct Arena {
     pub(crate) vertices: Buffer,
     /// Where vertices begin; only where the scene morphs.
     pub(crate) morphs: Option<Buffer>,
+    /// What lies over each slot; only where the scene has imagery.
+    pub(crate) drapes: Option<Buffer>,
     pub(crate) indices: Buffer,
     pub(crate) indices_per_patch: u32,
     pub(crate) vertices_per_patch: u32,
@@ -34,12 +37,14 @@ pub(crate) struct Arena {
 pub(crate) struct Copies {
     pub(crate) vertices: Vec<vk::BufferCopy>,
     pub(crate) morphs: Vec<vk::BufferCopy>,
+    pub(crate) drapes: Vec<vk::BufferCopy>,
 }
 
 impl Copies {
     fn clear(&mut self) {
         self.vertices.clear();
         self.morphs.clear();
+        self.drapes.clear();
     }
 
     /// Records them.
@@ -49,9 +54,13 @@ impl Copies {
         buffer: vk::CommandBuffer,
         (staging, arena): (&Buffer, &Arena),
     ) {
-        let morphs = arena.morphs.as_ref().map(|morphs| (morphs, &self.morphs));
-        for (to, regions) in [(&arena.vertices, &self.vertices)].into_iter().chain(morphs) {
-            if !regions.is_empty() {
+        let all = [
+            (Some(&arena.vertices), &self.vertices),
+            (arena.morphs.as_ref(), &self.morphs),
+            (arena.drapes.as_ref(), &self.drapes),
+        ];
+        for (to, regions) in all {
+            if let Some(to) = to.filter(|_| !regions.is_empty()) {
                 transfer::copies(device, buffer, (staging, to), regions);
             }
         }
@@ -91,10 +100,20 @@ impl Arena {
         };
         let vertices = column("patch vertices", size_of::<PatchVertex>())?;
         let morphs = settings.morphs().then(|| column("patch morphs", size_of::<PatchMorph>()));
+        let drapes = settings.imagery.then(|| {
+            let info = BufferInfo {
+                name: "patch drapes",
+                bytes: u64::from(patches_max) * size_of::<PatchDrape>() as u64,
+                usage: vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
+                location: MemoryLocation::GpuOnly,
+            };
+            Buffer::new(device, &info)
+        });
         let indices = index_buffer(device, one_off, &pattern)?;
         Ok(Self {
             vertices,
             morphs: morphs.transpose()?,
+            drapes: drapes.transpose()?,
             indices,
             indices_per_patch: 3 << patch_depth,
             vertices_per_patch,
@@ -105,7 +124,9 @@ impl Arena {
     /// A buffer to stage patches in; holds at least one.
     pub(crate) fn staging(&self, device: &Arc<Device>, name: &str) -> Result<Buffer, Fault> {
         let patch: u64 = self.patch_bytes().iter().sum();
-        let all = self.vertices.bytes + self.morphs.as_ref().map_or(0, |morphs| morphs.bytes);
+        let others = [self.morphs.as_ref(), self.drapes.as_ref()];
+        let others: u64 = others.into_iter().flatten().map(|buffer| buffer.bytes).sum();
+        let all = self.vertices.bytes + others;
         let info = BufferInfo {
             name,
             bytes: (STAGING_BYTES.min(all) / patch).max(1) * patch,
@@ -115,11 +136,12 @@ impl Arena {
         Buffer::new(device, &info)
     }
 
-    /// Bytes of one patch's vertices, and of its morphs.
-    fn patch_bytes(&self) -> [u64; 2] {
+    /// Bytes of one patch's vertices, of its morphs, of what lies over it.
+    fn patch_bytes(&self) -> [u64; 3] {
         let vertices = u64::from(self.vertices_per_patch);
         let morph = if self.morphs.is_some() { size_of::<PatchMorph>() } else { 0 };
-        [vertices * size_of::<PatchVertex>() as u64, vertices * morph as u64]
+        let drape = if self.drapes.is_some() { size_of::<PatchDrape>() } else { 0 };
+        [vertices * size_of::<PatchVertex>() as u64, vertices * morph as u64, drape as u64]
     }
 
     /// The device's copies of these slots are out of date. Slots beyond the arena are ignored.
@@ -138,7 +160,7 @@ impl Arena {
 
     /// Stages live slots that are out of date, in order of slot, until the buffer is full. They
     /// count as up to date from now on: `copies` must be executed. Vertices are staged from the
-    /// buffer's beginning on, morphs in its last part.
+    /// buffer's beginning on, then morphs, then drapes.
     pub(crate) fn stage(
         &mut self,
         patches: &Patches,
@@ -147,8 +169,8 @@ impl Arena {
     ) -> Staged {
         copies.clear();
         let mut staged = Staged::default();
-        let [vertices, morphs] = self.patch_bytes();
-        let room = staging.bytes / (vertices + morphs);
+        let [vertices, morphs, drapes] = self.patch_bytes();
+        let room = staging.bytes / (vertices + morphs + drapes);
         let bytes = staging.mapped_mut();
         let mut put = |at: u64, from: &[u8]| {
             let at = usize::try_from(at).expect("staging is mapped, so it fits");
@@ -169,7 +191,12 @@ impl Arena {
                 put(from, bytes_of(morphs_of(patches, slot)));
                 push_copy(&mut copies.morphs, from, u64::from(slot) * morphs, morphs);
             }
-            staged.bytes += vertices + morphs;
+            if drapes > 0 {
+                let from = room * (vertices + morphs) + at * drapes;
+                put(from, bytes_of(&patches.drapes[slot as usize..][..1]));
+                push_copy(&mut copies.drapes, from, u64::from(slot) * drapes, drapes);
+            }
+            staged.bytes += vertices + morphs + drapes;
             staged.patches += 1;
             next = slot + 1;
         }

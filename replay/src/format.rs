@@ -18,6 +18,11 @@
 //! E       frames u64
 //! ```
 //!
+//! | version | what came with it |
+//! |---|---|
+//! | 1 | flights, which are still written so; recordings without flags |
+//! | 2 | recordings with a byte of flags at the end of each frame |
+//!
 //! The check byte makes a damaged length look damaged: without it a length that points past the
 //! end would be taken for a file that was cut off.
 
@@ -30,12 +35,17 @@ use overfly_core::settings::SceneSettings;
 
 /// The first bytes of every file.
 pub const MAGIC: [u8; 8] = *b"OVERFLY\0";
-/// The version that this crate writes; it reads this one only, as there is no other yet.
-pub const VERSION: u32 = 1;
+/// The newest version; this crate reads all of them, and writes the oldest that holds the kind.
+pub const VERSION: u32 = 2;
+/// The first version.
+const FIRST_VERSION: u32 = 1;
 /// Every frame whose index is a multiple of this refers to no earlier one.
 pub const KEY_EVERY: u64 = 256;
 /// Largest payload of a block in bytes.
 pub const PAYLOAD_MAX: usize = (1 << 24) - 1;
+
+/// The setting that scenes have had since there are morphs, and its value before: none.
+const BEFORE_MORPHS: (&str, &str) = ("lod.morph_s", "0.0");
 
 /// How the paths end under which a header lists what archives hold.
 const CONTENT: &str = ".content";
@@ -53,6 +63,26 @@ pub enum Kind {
     Flight,
     /// Everything that went into each frame, and its digest: replays in its own scene only.
     Recording,
+}
+
+impl Kind {
+    /// The version that a file of this kind is written in.
+    pub(crate) fn version(self) -> u32 {
+        match self {
+            Self::Flight => FIRST_VERSION,
+            Self::Recording => VERSION,
+        }
+    }
+}
+
+/// Whether this crate reads a version.
+pub(crate) fn is_readable(version: u32) -> bool {
+    (FIRST_VERSION..=VERSION).contains(&version)
+}
+
+/// Whether the frames of recordings of a version have flags.
+pub(crate) fn has_flags(version: u32) -> bool {
+    version > FIRST_VERSION
 }
 
 impl fmt::Display for Kind {
@@ -73,6 +103,8 @@ pub struct RecordedFrame {
     pub views: Vec<View>,
     /// The pages that arrived, in order.
     pub arrived: Vec<PageKey>,
+    /// The mesh was held as it was; `false` in all recordings of version 1.
+    pub hold_lod: bool,
     /// What the frame ended in.
     pub digest: FrameDigest,
 }
@@ -160,12 +192,19 @@ impl Header {
 
     /// The settings of `scene` that are not the recorded ones, in the recording's order, then those
     /// that the recording lacks. Empty where it may be replayed; always so for a flight.
+    ///
+    /// A recording from before there were morphs replays in a scene that has none.
     pub fn differs_from(&self, scene: &SceneSettings) -> Vec<Difference> {
         if self.kind == Kind::Flight {
             return Vec::new();
         }
         let recorded = self.settings.iter().filter(|(path, _)| !path.ends_with(CONTENT));
-        differences(&recorded.cloned().collect::<Vec<_>>(), &scene.listing())
+        let mut recorded: Vec<_> = recorded.cloned().collect();
+        let (path, value) = BEFORE_MORPHS;
+        if recorded.iter().all(|(recorded, _)| recorded != path) {
+            recorded.push((path.into(), value.into()));
+        }
+        differences(&recorded, &scene.listing())
     }
 
     /// The payload of the header block.

@@ -9,7 +9,8 @@
 //! flight      index, words: time, latitude, longitude, height, heading, pitch, roll
 //! recording   index, count of views, words: time, four digests, then of each view: eye x y z,
 //!             orientation x y z w, field of view, near distance, width | height << 32;
-//!             count of arrivals, key of each against the key before
+//!             count of arrivals, key of each against the key before; from version 2 on
+//!             flags u8 (1: the level of detail was held)
 //! ```
 //!
 //! The reference of a time is index / rate, so that a steady clock takes one byte a frame; that of
@@ -28,6 +29,8 @@ use overfly_core::units::Radians;
 const POSE_WORDS: usize = 7;
 const FRAME_WORDS: usize = 5;
 const VIEW_WORDS: usize = 10;
+/// The level of detail was held.
+const HOLD_LOD: u8 = 1;
 
 /// What the next frame refers to.
 pub(crate) struct Columns {
@@ -104,6 +107,7 @@ impl Columns {
             put_word(out, key.bits(), before);
             before = key.bits();
         }
+        out.push(if frame.hold_lod { HOLD_LOD } else { 0 });
     }
 
     /// Reads the index in front of a payload.
@@ -124,10 +128,11 @@ impl Columns {
         })
     }
 
-    /// Reads a recorded frame after its index.
+    /// Reads a recorded frame after its index, with flags or from before there were any.
     pub(crate) fn decode_frame(
         &mut self,
         input: &mut Input<'_>,
+        has_flags: bool,
     ) -> Result<RecordedFrame, &'static str> {
         let views = input.count().and_then(|n| usize::try_from(n).ok()).ok_or("count of views")?;
         let words = views.checked_mul(VIEW_WORDS).and_then(|n| n.checked_add(FRAME_WORDS));
@@ -135,12 +140,15 @@ impl Columns {
         let words = words.filter(|&n| n <= input.len()).ok_or("count of views")?;
         self.take_words(input, words).ok_or("views")?;
         let arrived = decode_arrivals(input).ok_or("arrivals")?;
+        let flags = if has_flags { input.byte() } else { Some(0) };
+        let flags = flags.filter(|flags| flags & !HOLD_LOD == 0).ok_or("flags")?;
         let [_, pages, mesh, vertices, draws] =
             self.words[..FRAME_WORDS].try_into().expect("the frame's words were read");
         Ok(RecordedFrame {
             time_s: f64::from_bits(self.words[0]),
             views: self.words[FRAME_WORDS..].chunks_exact(VIEW_WORDS).map(view_of_words).collect(),
             arrived,
+            hold_lod: flags & HOLD_LOD != 0,
             digest: FrameDigest { pages, mesh, vertices, draws },
         })
     }

@@ -7,7 +7,7 @@
 
 use crate::format::{
     BLOCK_HEAD, END_MARK, FRAME_MARK, HEADER_MARK, Header, Kind, MAGIC, RecordedFrame, VERSION,
-    check_byte,
+    check_byte, has_flags, is_readable,
 };
 use crate::payload::Columns;
 use crate::pose::Pose;
@@ -21,6 +21,7 @@ use std::path::Path;
 pub struct Reader {
     bytes: Vec<u8>,
     file: String,
+    version: u32,
     header: Header,
     columns: Columns,
     /// Where the next block begins.
@@ -60,7 +61,7 @@ pub enum ReadError {
     Version {
         /// Which file.
         file: String,
-        /// What it says; this crate reads [`VERSION`].
+        /// What it says; this crate reads up to [`VERSION`].
         found: u32,
     },
     /// A flight where a recording was asked for, or the other way round.
@@ -171,7 +172,10 @@ impl fmt::Display for ReadError {
                 write!(f, "{file}: at byte 0: expected \"{expected}\", found \"{found}\"")
             }
             Self::Version { file, found } => {
-                write!(f, "{file}: at byte 8: expected version {VERSION}, found version {found}")
+                write!(
+                    f,
+                    "{file}: at byte 8: expected version 1 to {VERSION}, found version {found}"
+                )
             }
             Self::Kind { file, expected, found } => {
                 write!(f, "{file}: expected a {expected}, found a {found}")
@@ -241,7 +245,7 @@ impl Reader {
     /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// Where the file cannot be read, is no `.ovf` file of this version, or has no whole header.
+    /// Where the file cannot be read, is no `.ovf` file of a known version, or has no whole header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let file = path.display().to_string();
         match std::fs::read(path) {
@@ -266,6 +270,7 @@ impl Reader {
         let mut reader = Self {
             bytes,
             file,
+            version: VERSION,
             header: Header::flight("", 1.0),
             columns: Columns::new(1.0),
             offset: 0,
@@ -276,9 +281,10 @@ impl Reader {
             return Err(reader.truncated());
         };
         let found = u32::from_le_bytes(version.try_into().expect("four bytes were taken"));
-        if found != VERSION {
+        if !is_readable(found) {
             return Err(ReadError::Version { file: reader.file, found });
         }
+        reader.version = found;
         reader.offset = MAGIC.len() + 4;
         let (marker, payload) = reader.block()?;
         if marker != HEADER_MARK {
@@ -354,7 +360,9 @@ impl Reader {
         }
         let frame = match self.header.kind {
             Kind::Flight => self.columns.decode_pose(&mut input).map(Frame::Pose),
-            Kind::Recording => self.columns.decode_frame(&mut input).map(Frame::Recorded),
+            Kind::Recording => {
+                self.columns.decode_frame(&mut input, has_flags(self.version)).map(Frame::Recorded)
+            }
         };
         let whole = input.len() == 0;
         match frame {

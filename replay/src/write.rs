@@ -6,8 +6,8 @@
 //! Not here: the bytes themselves (`format`, `payload`).
 
 use crate::format::{
-    END_MARK, FRAME_MARK, HEADER_MARK, Header, Kind, MAGIC, PAYLOAD_MAX, RecordedFrame, VERSION,
-    block_head, rate_is_usable,
+    END_MARK, FRAME_MARK, HEADER_MARK, Header, Kind, MAGIC, PAYLOAD_MAX, RecordedFrame, block_head,
+    rate_is_usable,
 };
 use crate::payload::Columns;
 use crate::pose::Pose;
@@ -148,7 +148,7 @@ impl Writer {
             payload: header.encode(),
         };
         writer.block.extend_from_slice(&MAGIC);
-        writer.block.extend_from_slice(&VERSION.to_le_bytes());
+        writer.block.extend_from_slice(&header.kind.version().to_le_bytes());
         writer.write_block(HEADER_MARK)?;
         Ok(writer)
     }

@@ -91,12 +91,14 @@ fn tiny_frames() -> Vec<RecordedFrame> {
         time_s: 0.0,
         views: vec![view(0.0)],
         arrived: vec![PageKey::root(0), PageKey::root(3), PageKey::root(3).child(2)],
+        hold_lod: false,
         digest,
     };
     let second = RecordedFrame {
         time_s: 1.0 / 60.0,
         views: vec![view(0.25), view(100.0)],
         arrived: vec![],
+        hold_lod: true,
         digest: FrameDigest { draws: 5, ..digest },
     };
     let third = RecordedFrame { time_s: 0.04, views: vec![], ..RecordedFrame::default() };
@@ -153,6 +155,7 @@ fn blocks(bytes: &[u8]) -> Vec<usize> {
 /// All numbers of a frame as bits, so that −0.0 is not 0.0 and NaN is itself.
 fn bits(frame: &RecordedFrame) -> Vec<u64> {
     let mut bits = vec![frame.time_s.to_bits()];
+    bits.push(u64::from(frame.hold_lod));
     bits.extend(frame.digest.parts());
     for view in &frame.views {
         bits.extend(view.eye.0.to_array().map(f64::to_bits));
@@ -195,10 +198,11 @@ fn any_key() -> impl Strategy<Value = PageKey> {
 fn any_frame() -> impl Strategy<Value = RecordedFrame> {
     let views = proptest::collection::vec(any_view(), 0..4);
     let arrived = proptest::collection::vec(any_key(), 0..20);
-    (any_f64(), views, arrived, any::<[u64; 4]>()).prop_map(|(time_s, views, arrived, parts)| {
+    let fed = (any_f64(), views, arrived, any::<bool>());
+    (fed, any::<[u64; 4]>()).prop_map(|((time_s, views, arrived, hold_lod), parts)| {
         let [pages, mesh, vertices, draws] = parts;
         let digest = FrameDigest { pages, mesh, vertices, draws };
-        RecordedFrame { time_s, views, arrived, digest }
+        RecordedFrame { time_s, views, arrived, hold_lod, digest }
     })
 }
 
@@ -363,7 +367,7 @@ fn errors_say_file_offset_expected_and_found() {
     let text = |bytes: &[u8]| read_all(bytes).2.unwrap().to_string();
     let mut bytes = whole.clone();
     bytes[8] = 9;
-    assert_eq!(text(&bytes), "tiny.ovf: at byte 8: expected version 1, found version 9");
+    assert_eq!(text(&bytes), "tiny.ovf: at byte 8: expected version 1 to 2, found version 9");
     assert_eq!(
         text(b"RIFF\x01\0\0\0WAVE"),
         "tiny.ovf: at byte 0: expected \"OVERFLY\\x00\", found \"RIFF\\x01\\x00\\x00\\x00\""
@@ -425,10 +429,100 @@ fn kinds_and_rates_are_not_mixed_up() {
     assert!(refused.unwrap_err().to_string().contains("folder.ovf: cannot write at byte 0: "));
 }
 
+fn golden(hex: &str) -> Vec<u8> {
+    let digits: Vec<u8> = hex.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
+    let byte = |pair: &[u8]| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.chunks(2).map(byte).collect()
+}
+
 /// A change of these bytes makes every existing recording unreadable: raise the version with it.
 #[test]
-fn the_layout_of_version_1_is_as_it_always_was() {
-    let hex: String = tiny_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
-    let golden: String = include_str!("golden/tiny.hex").split_whitespace().collect();
-    assert_eq!(hex, golden);
+fn the_layout_of_version_2_is_as_it_always_was() {
+    assert_eq!(tiny_bytes(), golden(include_str!("golden/tiny_2.hex")));
+}
+
+#[test]
+fn recordings_of_version_1_are_still_read_and_held_nothing() {
+    let (frames, complete, error) = read_all(&golden(include_str!("golden/tiny.hex")));
+    assert!(complete && error.is_none());
+    let before = |frame: RecordedFrame| RecordedFrame { hold_lod: false, ..frame };
+    assert_eq!(frames, tiny_frames().into_iter().map(before).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_flight_is_written_as_version_1_and_a_recording_as_version_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("any.ovf");
+    Writer::create(&path, &Header::flight("flight", 60.0)).unwrap().finish().unwrap();
+    assert_eq!(fs::read(&path).unwrap()[8..12], [1, 0, 0, 0]);
+    assert_eq!(tiny_bytes()[8..12], [2, 0, 0, 0]);
+    for version in [0, 3] {
+        let mut bytes = tiny_bytes();
+        bytes[8] = version;
+        assert!(matches!(read_all(&bytes).2, Some(ReadError::Version { found, .. })
+            if found == u32::from(version)));
+    }
+}
+
+/// Neither version is taken for the other: the checksums are right, so the fields must tell.
+#[test]
+fn a_wrong_version_is_found_in_the_first_frame() {
+    let fault = |bytes: &[u8]| match read_all(bytes) {
+        (frames, false, Some(ReadError::Corrupt { what, .. })) if frames.is_empty() => what,
+        other => panic!("{other:?}"),
+    };
+    let mut bytes = tiny_bytes();
+    bytes[8] = 1;
+    assert_eq!(fault(&bytes), Fault::Field { name: "end of the frame" });
+    let mut bytes = golden(include_str!("golden/tiny.hex"));
+    bytes[8] = 2;
+    assert_eq!(fault(&bytes), Fault::Field { name: "flags" });
+}
+
+/// A host's window has no steady clock: it stands, jumps and goes back, and views come and go.
+#[test]
+fn a_session_of_a_window_is_recorded_frame_by_frame_whatever_its_clock_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.ovf");
+    let [first, second, _] = <[RecordedFrame; 3]>::try_from(tiny_frames()).unwrap();
+    let times_s = [0.0, 0.0, 0.016_683, 0.041_9, 0.041_9, 17.5, 17.501, 3.25, -1.0, 1e6];
+    let session = times_s.into_iter().enumerate().map(|(i, time_s)| RecordedFrame {
+        time_s,
+        hold_lod: (3..6).contains(&i),
+        ..if i % 2 == 0 { first.clone() } else { second.clone() }
+    });
+    let session: Vec<_> = session.collect();
+    let mut writer = Writer::create(&path, &Header::recording("view", 60.0, &scene())).unwrap();
+    for (i, frame) in session.iter().enumerate() {
+        writer.frame(frame).unwrap();
+        assert_eq!(Recording::open(&path).unwrap().frames, session[..=i], "readable at once");
+    }
+    writer.finish().unwrap();
+    let recording = Recording::open(&path).unwrap();
+    assert!(matches!(recording.ending, Ending::Complete));
+    assert_eq!(recording.frames, session);
+}
+
+#[test]
+fn a_recording_from_before_there_were_morphs_replays_in_a_scene_without_any() {
+    let mut header = Header::recording("old", 60.0, &scene());
+    header.settings.retain(|(path, _)| path != "lod.morph_s");
+    assert_eq!(header.differs_from(&scene()), []);
+    let mut morphing = scene();
+    morphing.lod.morph_s = 0.25;
+    let [difference] = header.differs_from(&morphing).try_into().unwrap();
+    assert_eq!(difference.to_string(), "lod.morph_s: recorded with 0.0, now 0.25");
+}
+
+#[test]
+fn a_recording_replays_with_another_renderer_but_not_with_other_ranges() {
+    let header = Header::recording("scene", 60.0, &scene());
+    let mut other = scene();
+    (other.depth.format, other.depth.order) = (DepthFormat::D24, DepthOrder::Forward);
+    (other.vertices, other.imagery) = (VertexPrecision::EyeF64, vec!["blue.pmtiles".into()]);
+    assert_eq!(header.differs_from(&other), []);
+    other.depth.splits_m = vec![30.0, 1e4];
+    let [difference] = header.differs_from(&other).try_into().unwrap();
+    let expected = "depth.splits_m: recorded with [1000.0], now [30.0, 10000.0]";
+    assert_eq!(difference.to_string(), expected);
 }

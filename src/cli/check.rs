@@ -12,6 +12,7 @@ use overfly::config;
 use overfly::core::datasource::Page;
 use overfly::core::datasource::page::Survey;
 use overfly::core::limits::Limits;
+use overfly::core::settings::{SceneSettings, SunSettings};
 use overfly::sources::{Sources, level_of};
 use std::process::ExitCode;
 
@@ -28,8 +29,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     for (path, value) in scene.listing() {
         say!("{path:<22} {value}");
     }
-    let sun = scene.sun.map_or("none".into(), |sun| format!("{:?}", sun.direction.to_array()));
-    say!("{:<22} {sun} (drawing only: recordings do not compare it)", "sun");
+    for (path, value) in drawing_only(&scene) {
+        say!("{path:<22} {value} (drawing only: recordings do not compare it)");
+    }
     let limits = Limits::of(&scene);
     let survey = if scene.archives().next().is_some() { size_of::<Survey>() } else { 0 };
     let pages_mib = u64::from(limits.pages) * (size_of::<Page>() + survey) as u64 / (1 << 20);
@@ -41,6 +43,25 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let sources = Sources::open(&scene, &OpenOptions::default())?;
     sources.archives().iter().for_each(list);
     Ok(ExitCode::SUCCESS)
+}
+
+/// The settings that the listing leaves out.
+fn drawing_only(scene: &SceneSettings) -> [(&'static str, String); 5] {
+    let sun = match scene.sun {
+        None => "none".into(),
+        Some(SunSettings::Fixed { direction }) => format!("{:?}", direction.to_array()),
+        Some(SunSettings::Clock { start_unix_s, runs }) => {
+            let from = if runs { "from" } else { "always as at" };
+            format!("{from} {}", config::utc_text(start_unix_s))
+        }
+    };
+    [
+        ("depth.format", format!("{:?}", scene.depth.format)),
+        ("depth.order", format!("{:?}", scene.depth.order)),
+        ("vertices", format!("{:?}", scene.vertices)),
+        ("imagery", format!("{:?}", scene.imagery)),
+        ("sun", sun),
+    ]
 }
 
 /// What an archive says about itself.

@@ -1,18 +1,21 @@
-//! `overfly ingest`: real elevation into an archive.
+//! `overfly ingest`: real elevation, or imagery, into an archive.
 //!
-//! In:    rasters of heights; options.
+//! In:    rasters of heights, or a picture; options.
 //! Out:   a PMTiles archive, a table; an exit code.
 //! Keeps: nothing.
 //! Not here: what is done with the rasters (`overfly_ingest`).
 
-use super::{BAD_INPUT, Failure, INTERRUPTED};
+use super::{Failure, INTERRUPTED};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::archive::Datum;
 use overfly::core::geodesy::Ellipsoid;
-use overfly::ingest::raster::{OpenOptions, TileEncoding};
-use overfly::ingest::{BuildOptions, Difference, IngestError, Progress, Report, build, verify};
-use std::path::PathBuf;
+use overfly::ingest::raster::{OpenOptions, Projection, TileEncoding};
+use overfly::ingest::{
+    BuildOptions, Difference, ImageryOptions, ImageryReport, IngestError, Progress, Report, build,
+    build_imagery, verify, verify_imagery,
+};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,8 +28,16 @@ Examples:
   overfly ingest 'tiles/{z}/{x}/{y}.png' --encoding terrarium --output alps.pmtiles
   overfly ingest mola.tif --body mars --output mars.pmtiles
   overfly ingest world.png --extent=-180,-90,180,90 --scale 0.25 --offset -2000 --output world.pmtiles
+  overfly ingest --imagery world.tif --attribution \"NASA\" --output world-colour.pmtiles
 
-Then name it in a scene: sources: [Archive(\"bavaria.pmtiles\"), Procedural(seed: 2029)].";
+Then name it in a scene: sources: [Archive(\"bavaria.pmtiles\"), Procedural(seed: 2029)], and
+imagery: [\"world-colour.pmtiles\"].";
+
+/// What says how to read or to make heights, and nothing to a picture.
+const OF_HEIGHTS: [&str; 10] = [
+    "datum", "geoid", "blend", "level", "density", "encoding", "extent", "scale", "offset",
+    "nodata",
+];
 
 /// What `ingest` takes.
 #[derive(clap::Args)]
@@ -34,8 +45,23 @@ Then name it in a scene: sources: [Archive(\"bavaria.pmtiles\"), Procedural(seed
 pub struct Arguments {
     /// GeoTIFF (EPSG:4326, 3857), SRTM .hgt or .hgt.zip, 16-bit equirectangular .png, a folder of
     /// these, or a folder or template of {z}/{x}/{y}.png tiles. Finer inputs lie over coarser ones.
-    #[arg(required = true, value_name = "INPUT")]
+    #[arg(required_unless_present = "imagery", value_name = "INPUT")]
     inputs: Vec<PathBuf>,
+    /// A picture of the body instead: PNG or TIFF of 8 bits a channel, grey, RGB or RGBA. The whole
+    /// body, equirectangular and twice as wide as high, unless a TIFF (EPSG:4326, 3857), --bounds or
+    /// --projection say otherwise.
+    #[arg(long, value_name = "PICTURE", conflicts_with_all = OF_HEIGHTS)]
+    imagery: Option<PathBuf>,
+    /// Edges of the picture in degrees.
+    #[arg(long, value_name = "W,S,E,N", value_parser = parse_extent, allow_hyphen_values = true,
+          requires = "imagery")]
+    bounds: Option<[f64; 4]>,
+    /// How the picture is projected. [default: equirectangular]
+    #[arg(long, value_enum, requires = "imagery")]
+    projection: Option<ProjectionName>,
+    /// Whom to thank for the picture, wherever it is shown.
+    #[arg(long, value_name = "TEXT", requires = "imagery", default_value = "")]
+    attribution: String,
     /// The archive to write; an old one is replaced once the new one is whole.
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
@@ -99,6 +125,14 @@ enum EncodingName {
     TerrainRgb,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum ProjectionName {
+    /// Degrees of longitude and latitude.
+    Equirectangular,
+    /// Web Mercator, EPSG:3857.
+    Mercator,
+}
+
 fn parse_body(text: &str) -> Result<(String, Ellipsoid), String> {
     match text {
         "earth" => return Ok(("Earth".into(), Ellipsoid::WGS84)),
@@ -147,13 +181,16 @@ fn parse_extent(text: &str) -> Result<[f64; 4], String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if let Some(picture) = &arguments.imagery {
+        refuse_heights(arguments, picture)?;
+    }
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    let mut options = options(arguments);
+    let inputs = arguments.inputs.iter().chain(&arguments.imagery);
     let mut taken: Vec<PathBuf> =
-        arguments.inputs.iter().filter_map(|path| std::fs::canonicalize(path).ok()).collect();
-    options.output = super::place_of(&arguments.output, &mut taken)?;
+        inputs.filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    let output = super::place_of(&arguments.output, &mut taken)?;
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
@@ -161,43 +198,97 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     bar.set_style(ProgressStyle::with_template(
         "{msg:<10} {bar:32} {pos}/{len}  {per_sec}  {eta} left",
     )?);
-    let show = |progress| {
-        let (words, done, total) = match progress {
-            Progress::Looking(done, total) => ("looking", done, total),
-            Progress::Making(done, total) => ("making", done, total),
-            Progress::Writing(done, total) => ("writing", done, total),
-            Progress::Comparing(done, total) => ("comparing", done, total),
-        };
-        if bar.message() != words {
-            bar.reset();
-            bar.set_message(words);
-        }
-        bar.set_length(total);
-        bar.set_position(done);
+    let made = match &arguments.imagery {
+        Some(picture) => imagery(arguments, picture, output, (&stop, &bar)),
+        None => elevation(arguments, output, (&stop, &bar)),
     };
-    let built = build(&options, &stop, &show);
     bar.finish_and_clear();
-    let report = match built {
-        Err(IngestError::Stopped) => return Ok(stopped()),
-        built => built?,
-    };
-    tell(&options, &report);
-    if !arguments.verify {
-        return Ok(ExitCode::SUCCESS);
-    }
-    let compared = verify(&options, &stop, &show);
-    bar.finish_and_clear();
-    match compared {
+    match made {
         Err(IngestError::Stopped) => Ok(stopped()),
-        Err(error) => {
-            eprintln!("overfly: {error}");
-            Ok(ExitCode::from(BAD_INPUT))
-        }
-        Ok(differences) => {
-            tell_differences(&differences);
-            Ok(ExitCode::SUCCESS)
-        }
+        made => Ok(made.map(|()| ExitCode::SUCCESS)?),
     }
+}
+
+/// A picture and heights are two archives.
+fn refuse_heights(arguments: &Arguments, picture: &Path) -> Result<(), Failure> {
+    if let Some(first) = arguments.inputs.first() {
+        return Err(format!(
+            "--imagery {} and the elevation {}: an archive holds one or the other; run ingest \
+             twice, once for each",
+            picture.display(),
+            first.display()
+        )
+        .into());
+    }
+    Ok(())
+}
+
+fn show(bar: &ProgressBar, progress: Progress) {
+    let (words, done, total) = match progress {
+        Progress::Looking(done, total) => ("looking", done, total),
+        Progress::Making(done, total) => ("making", done, total),
+        Progress::Writing(done, total) => ("writing", done, total),
+        Progress::Comparing(done, total) => ("comparing", done, total),
+    };
+    if bar.message() != words {
+        bar.reset();
+        bar.set_message(words);
+    }
+    bar.set_length(total);
+    bar.set_position(done);
+}
+
+fn elevation(
+    arguments: &Arguments,
+    output: PathBuf,
+    (stop, bar): (&AtomicBool, &ProgressBar),
+) -> Result<(), IngestError> {
+    let options = BuildOptions { output, ..options(arguments) };
+    let report = build(&options, stop, &|progress| show(bar, progress))?;
+    bar.suspend(|| tell(&options, &report));
+    if arguments.verify {
+        let differences = verify(&options, stop, &|progress| show(bar, progress))?;
+        bar.suspend(|| tell_differences(&differences));
+    }
+    Ok(())
+}
+
+fn imagery(
+    arguments: &Arguments,
+    picture: &Path,
+    output: PathBuf,
+    (stop, bar): (&AtomicBool, &ProgressBar),
+) -> Result<(), IngestError> {
+    let options = ImageryOptions {
+        input: picture.to_path_buf(),
+        projection: arguments.projection.map(|name| match name {
+            ProjectionName::Equirectangular => Projection::PlateCarree,
+            ProjectionName::Mercator => Projection::WebMercator,
+        }),
+        bounds_deg: arguments.bounds,
+        attribution: arguments.attribution.clone(),
+        output,
+        body: arguments.body.clone(),
+    };
+    let report = build_imagery(&options, stop, &|progress| show(bar, progress))?;
+    bar.suspend(|| tell_imagery(&options, &report));
+    if arguments.verify {
+        let tiles = verify_imagery(&options, stop, &|progress| show(bar, progress))?;
+        bar.suspend(|| say!("{tiles} tiles read back, all as they were written"));
+    }
+    Ok(())
+}
+
+fn tell_imagery(options: &ImageryOptions, report: &ImageryReport) {
+    let ImageryReport { facts, kind, size: [columns, rows], .. } = report;
+    say!("{}, imagery", facts.body_name);
+    say!("{}: {kind} of {columns} × {rows} pixels, {} bytes", facts.source, report.bytes_in);
+    say!("pixels {:.1} m apart, tiles of depth 0 to {}", facts.spacing_m, facts.depth);
+    if !facts.attribution.is_empty() {
+        say!("by {}", facts.attribution);
+    }
+    say!("content {:016x}", facts.content);
+    say!("{}: {} tiles, {} bytes", options.output.display(), report.tiles, report.bytes);
 }
 
 fn stopped() -> ExitCode {

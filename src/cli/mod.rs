@@ -25,7 +25,9 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod source;
+pub mod still;
 pub mod stills;
+pub mod view;
 
 use std::path::{Path, PathBuf};
 
@@ -47,6 +49,7 @@ Examples:
   overfly doctor
   overfly replay rainier --no-render
   overfly replay descent --stills 8 --size 1280x720
+  overfly still --at 46.85,-121.76,5000 --look 40,-8 -o rainier.png
   overfly replay poles --no-render --record poles.ovf --loader-delay-ms 50
   overfly replay poles.ovf --no-render --workers 0
   overfly probe --at 46.8523,-121.7603";

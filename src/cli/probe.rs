@@ -9,11 +9,11 @@ use super::answers::{Answers, Format};
 use super::places::{Spot, Table, parse};
 use super::{Failure, place_of};
 use indicatif::{ProgressBar, ProgressStyle};
-use overfly::archive::OpenOptions;
+use overfly::archive::{Archive, Facts, LayerFacts, Location, OpenOptions};
 use overfly::config;
 use overfly::core::ground::{Answer, LEVEL_MAX, Place, Query};
 use overfly::core::units::Metres;
-use overfly::sources::{SourceError, Sources};
+use overfly::sources::{SourceError, Sources, level_of};
 use overfly::surveyor::Surveyor;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,8 @@ Examples:
   overfly probe --scene alps.ron --at 45.8326,6.8652 -33.96,18.40
   overfly probe --scene alps.ron --csv huts.csv --output heights.csv
   overfly probe --scene alps.ron --csv huts.csv --level within:5 --format json
-  overfly probe --scene alps.ron --at 45.8326,6.8652 --level exact:30";
+  overfly probe --scene alps.ron --at 45.8326,6.8652 --level exact:30
+  overfly probe --archive world-colour.pmtiles";
 
 /// What `probe` takes.
 #[derive(clap::Args)]
@@ -51,8 +52,11 @@ pub struct Arguments {
     scene: String,
     /// Places in degrees, south and west negative.
     #[arg(long, value_name = "LAT,LON", value_parser = parse, num_args = 1..,
-          required_unless_present = "csv", conflicts_with = "csv")]
+          required_unless_present_any = ["csv", "archive"], conflicts_with = "csv")]
     at: Vec<Spot>,
+    /// Shows what an archive, a file or an address, says about itself: its kind first.
+    #[arg(long, value_name = "ARCHIVE", conflicts_with_all = ["at", "csv", "scene", "output"])]
+    archive: Option<String>,
     /// Places from a file: columns lat (latitude, lat_deg) and lon (lng, longitude, lon_deg) by
     /// their titles, else the first two. A column id or name is kept.
     #[arg(long, value_name = "FILE")]
@@ -91,6 +95,9 @@ fn parse_level(text: &str) -> Result<Query, String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if let Some(name) = &arguments.archive {
+        return describe(name);
+    }
     let inputs = [Some(Path::new(&arguments.scene)), arguments.csv.as_deref()];
     let mut taken: Vec<PathBuf> =
         inputs.into_iter().flatten().filter_map(|path| path.canonicalize().ok()).collect();
@@ -107,6 +114,33 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     probe.answers.finish()?;
     probe.named.values().for_each(|what| eprintln!("overfly: {what}"));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What an archive says about itself.
+fn describe(name: &str) -> Result<ExitCode, Failure> {
+    let archive = Archive::open_any(&Location::parse(name), &OpenOptions::default())?;
+    let row = |what: &str, text: &str| say!("{what:<12} {text}");
+    match archive.facts() {
+        Facts::Elevation(facts) => {
+            let layer = |layer: &LayerFacts| level_of(layer.depth).to_string();
+            let sources = facts.layers.iter().flat_map(|layer| layer.sources.iter().cloned());
+            row("kind", "elevation");
+            row("body", &facts.body_name);
+            row("levels", &facts.layers.iter().map(layer).collect::<Vec<_>>().join(", "));
+            row("sources", &sources.collect::<Vec<_>>().join(", "));
+            row("content", &format!("{:016x}", facts.content));
+        }
+        Facts::Imagery(facts) => {
+            row("kind", "imagery");
+            row("body", &facts.body_name);
+            row("depths", &format!("0 to {}", facts.depth));
+            row("pixels", &format!("{:.1} m apart", facts.spacing_m));
+            row("source", &facts.source);
+            row("attribution", &facts.attribution);
+            row("content", &format!("{:016x}", facts.content));
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 

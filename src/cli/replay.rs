@@ -8,10 +8,11 @@
 use super::columns::Columns;
 use super::run::{Run, fly};
 use super::source::{Source, recording_header};
+use super::still::parse_show;
 use super::stills::{Stills, chosen};
 use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, place_of, report, write_whole};
 use overfly::core::settings::SceneSettings;
-use overfly::render_vk::{Renderer, RendererSettings};
+use overfly::render_vk::{Renderer, RendererSettings, Show};
 use overfly::replay::{Ending, Header, RunDigest, Writer};
 use overfly::{OpenError, Overfly, config};
 use std::collections::{BTreeSet, VecDeque};
@@ -47,6 +48,12 @@ pub struct Arguments {
     /// this every frame is drawn and none is written.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     stills: Option<u16>,
+    /// What pictures show: shaded, wireframe, level, error, residency, normals, range or culled.
+    #[arg(long, value_name = "NAME", default_value = "shaded", value_parser = parse_show)]
+    view: Show,
+    /// Draws every frame and writes it as DIR/frame-000000.png and so on, for a video.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["stills", "no_render"])]
+    video: Option<PathBuf>,
     /// Records views, page arrivals and digests of every frame.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -69,7 +76,8 @@ fn parse_frames(text: &str) -> Result<Range<usize>, String> {
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+/// A picture's width and height.
+pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let wrong = || format!("`{text}` is not WxH with whole numbers from 1 to 8192");
     let (w, h) = text.split_once('x').ok_or_else(wrong)?;
     let side = |text: &str| match text.parse() {
@@ -127,6 +135,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     for file in run.pictures.finish()? {
         say!("wrote {}", file.display());
+    }
+    if let Some(folder) = &run.video {
+        let (folder, rate_hz) = (folder.display(), run.source.rate_hz());
+        say!("wrote the frames to {folder}; a video of them, where ffmpeg is installed:");
+        let input = format!("-framerate {rate_hz} -i {folder}/frame-%06d.png");
+        say!("  ffmpeg {input} -c:v libx264 -pix_fmt yuv420p {folder}/flight.mp4");
     }
     let messages = overfly.with_renderer(|renderer| renderer.validation_messages());
     let messages = messages.unwrap_or_default();
@@ -193,7 +207,8 @@ fn scene_of(
     }
 }
 
-fn default_workers() -> usize {
+/// As many threads as there are cores, the caller among them.
+pub fn default_workers() -> usize {
     std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1).min(64)
 }
 
@@ -212,12 +227,13 @@ fn places(arguments: &Arguments) -> Result<Places, Failure> {
         path.as_deref().map(|path| place_of(path, &mut taken)).transpose()
     };
     let places = Places { record: place(&arguments.record)?, json: place(&arguments.json)? };
-    match &arguments.out {
-        Some(out) if out.exists() && !out.is_dir() => {
-            Err(format!("--out {}: is there and is not a folder", out.display()).into())
+    for (option, folder) in [("--out", &arguments.out), ("--video", &arguments.video)] {
+        if let Some(folder) = folder.as_ref().filter(|path| path.exists() && !path.is_dir()) {
+            let folder = folder.display();
+            return Err(format!("{option} {folder}: is there and is not a folder").into());
         }
-        _ => Ok(places),
     }
+    Ok(places)
 }
 
 fn prepare(
@@ -251,6 +267,7 @@ fn prepare(
         return Err("--record and --frames do not go with a recording: it is recorded whole".into());
     }
     let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
+    overfly.looks_mut().show = arguments.view;
     let draws = !arguments.no_render && add_renderer(overfly, &scene, size_px, arguments.validate)?;
     let stills = arguments.stills.map_or(0, usize::from);
     let delay_s = f64::from(arguments.loader_delay_ms.unwrap_or(0)) / 1e3;
@@ -276,6 +293,7 @@ fn prepare(
         columns: Columns::new(reported.len()),
         digest: RunDigest::default(),
         diverged: None,
+        video: arguments.video.clone().filter(|_| draws),
         pictures: Stills::new(arguments.out.clone().unwrap_or(folder), source.name()),
         reported,
         source,

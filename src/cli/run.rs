@@ -8,7 +8,7 @@
 use super::Failure;
 use super::columns::Columns;
 use super::source::Source;
-use super::stills::Stills;
+use super::stills::{Stills, write_png};
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::Overfly;
 use overfly::core::datasource::PageKey;
@@ -19,6 +19,7 @@ use overfly::loader::Loader;
 use overfly::replay::{RecordedFrame, RunDigest, Writer};
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::Range;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -41,6 +42,8 @@ pub struct Run {
     pub count: usize,
     pub stills: Vec<usize>,
     pub draws: bool,
+    /// Folder for a picture of every frame.
+    pub video: Option<PathBuf>,
     pub loader: Loader,
     /// Archives of which it was said that they fail.
     pub named: BTreeSet<String>,
@@ -124,7 +127,8 @@ fn frame(
         name_faults(run);
     }
     let arrived = input.arrived.iter().map(|page| page.key).collect();
-    let mut record = RecordedFrame { time_s: input.time_s, arrived, ..Default::default() };
+    let FrameInput { time_s, hold_lod, .. } = *input;
+    let mut record = RecordedFrame { time_s, arrived, hold_lod, ..Default::default() };
     if run.recorder.is_some() {
         record.views.extend_from_slice(&input.views);
     }
@@ -140,6 +144,12 @@ fn frame(
     let end_ns = now_ns();
     if still && drawn {
         take_stills(run, overfly, index, output)?;
+    }
+    if let Some(folder) = run.video.as_ref().filter(|_| drawn) {
+        let file = folder.join(format!("frame-{:06}.png", index - run.reported.start));
+        let pixels = overfly.with_renderer(|renderer| renderer.read_pixels());
+        let pixels = pixels.transpose()?.ok_or("there is no renderer any more")?;
+        write_png(&file, run.size_px, pixels)?;
     }
     if let Some(recorder) = &mut run.recorder {
         record.digest = output.digest;

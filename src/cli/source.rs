@@ -121,7 +121,7 @@ impl Source {
         }
     }
 
-    /// Fills views and time of frame `index`; a flight's views are the scene's.
+    /// Fills what frame `index` starts from but its pages; a flight's views are the scene's.
     pub fn fill(
         &self,
         index: usize,
@@ -133,13 +133,13 @@ impl Source {
         match self {
             Self::Flight(flight, _) => {
                 let pose = &flight.poses[index];
-                input.time_s = pose.time_s;
+                (input.time_s, input.hold_lod) = (pose.time_s, false);
                 let lenses = scene.views.iter();
                 input.views.extend(lenses.map(|lens| view_of(pose, lens, size_px, &scene.body)));
             }
             Self::Recording(recording) => {
                 let frame = &recording.frames[index];
-                input.time_s = frame.time_s;
+                (input.time_s, input.hold_lod) = (frame.time_s, frame.hold_lod);
                 input.views.extend_from_slice(&frame.views);
             }
         }

@@ -9,7 +9,7 @@ use super::{Failure, write_whole};
 use image::imageops::{FilterType, overlay, resize};
 use image::{ImageFormat, Rgba, RgbaImage};
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Pictures side by side on the sheet.
 const COLUMNS: u32 = 2;
@@ -83,13 +83,24 @@ impl Stills {
     }
 
     fn write(&mut self, picture: &RgbaImage, file: &str) -> Result<(), Failure> {
-        let mut bytes = Cursor::new(Vec::new());
-        picture.write_to(&mut bytes, ImageFormat::Png)?;
         let path = self.folder.join(file);
-        write_whole(&path, bytes.get_ref())?;
+        write_image(&path, picture)?;
         self.files.push(path);
         Ok(())
     }
+}
+
+/// Writes a picture of RGBA rows, top first, as PNG.
+pub fn write_png(path: &Path, size_px: [u32; 2], pixels: Vec<u8>) -> Result<(), Failure> {
+    let picture = RgbaImage::from_raw(size_px[0], size_px[1], pixels)
+        .ok_or("the renderer gave a picture of another size")?;
+    write_image(path, &picture)
+}
+
+fn write_image(path: &Path, picture: &RgbaImage) -> Result<(), Failure> {
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
+    write_whole(path, bytes.get_ref())
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::flights::Tour;
 use overfly::render_vk::{Renderer, RendererSettings, devices};
 
 /// Whether there is a device; says so where there is none.
-fn device(test: &str) -> bool {
+pub fn device(test: &str) -> bool {
     let found = devices().is_ok_and(|devices| !devices.is_empty());
     let required = std::env::var("OVERFLY_REQUIRE_GPU").is_ok_and(|value| value == "1");
     assert!(found || !required, "OVERFLY_REQUIRE_GPU=1 and no Vulkan device");
@@ -21,14 +21,8 @@ fn device(test: &str) -> bool {
 }
 
 fn with_renderer(mut tour: Tour) -> Tour {
-    let renderer = Renderer::new(&RendererSettings {
-        patch_depth: tour.scene.lod.patch_depth,
-        patches_max: tour.overfly.terrain().limits().leaves,
-        size_px: [640, 360],
-        ranges_max: 3,
-        frames_in_flight: 2,
-        validation: false,
-    });
+    let limits = tour.overfly.terrain().limits();
+    let renderer = Renderer::new(&RendererSettings::of(&tour.scene, limits, [640, 360]));
     tour.overfly.set_renderer(renderer.unwrap());
     tour
 }

@@ -1,4 +1,4 @@
-//! What a terrain archive says about itself: body, datum, layers, heights, content.
+//! What an archive says about itself: body, datum, layers, heights, content; or imagery.
 //!
 //! In:    a reader of archives, which has checked every range.
 //! Out:   plain facts for sources and bounds.
@@ -31,6 +31,30 @@ pub struct ArchiveFacts {
 pub const FORMAT_VERSION: u32 = 1;
 /// An archive has no more layers than this.
 pub const LAYERS_MAX: usize = 16;
+
+/// Everything that an archive of imagery states once, for all of its tiles.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ImageryFacts {
+    /// Version of the format of its tiles and of these facts; [`IMAGERY_VERSION`] is the only one.
+    pub version: u32,
+    /// What body is seen, for people.
+    pub body_name: String,
+    /// Shape of that body.
+    pub body: Ellipsoid,
+    /// Depth of its last tiles.
+    pub depth: u8,
+    /// Distance of the picture's pixels at its middle. Metres.
+    pub spacing_m: f64,
+    /// Whom to thank, wherever it is shown; may be empty.
+    pub attribution: String,
+    /// Name of the picture that it was made from.
+    pub source: String,
+    /// Hash of the archive's content: archives of equal hash give equal colours.
+    pub content: u64,
+}
+
+/// The version of archives of imagery that this build reads and writes.
+pub const IMAGERY_VERSION: u32 = 1;
 
 /// What heights are counted from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,10 +1,11 @@
 //! Makes the pages of a scene: on the host's threads, never in a frame.
 //!
-//! In:    a page key and the tiles it needs; the scene's ground, the body, the patch depth.
+//! In:    a page key, the tiles it needs, its colour; the scene's ground, the body, the patch depth.
 //! Out:   a [`Page`]. A pure function of these: any thread, any order, same bits.
 //! Keeps: nothing but the immutable ground.
 //! Not here: heights (`compose`, `procedural`), fetching tiles (the host's loader).
 
+use super::colour::ColourTile;
 use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, holds};
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
@@ -101,6 +102,20 @@ impl Generator {
     /// # Panics
     /// If there are fewer or more tiles.
     pub fn page_from(&self, key: PageKey, tiles: &[Option<Arc<Tile>>]) -> Arc<Page> {
+        self.page_with(key, tiles, None)
+    }
+
+    /// Makes one page as [`Self::page_from`] does, with the imagery of its cell on it.
+    ///
+    /// # Panics
+    /// If there are fewer or more tiles, or the colour is another cell's.
+    pub fn page_with(
+        &self,
+        key: PageKey,
+        tiles: &[Option<Arc<Tile>>],
+        colour: Option<Arc<ColourTile>>,
+    ) -> Arc<Page> {
+        assert!(colour.as_ref().is_none_or(|colour| colour.key == key), "the cell's own colour");
         let needs = self.needs(key);
         assert_eq!(needs.len(), tiles.len(), "a tile, or none, for every need");
         let survey = Survey {
@@ -114,8 +129,8 @@ impl Generator {
             normals: [[0; 2]; SAMPLES],
             layers: [[0; 4]; SAMPLES],
             bounds: [Bound::default(); BOUND_SIDE * BOUND_SIDE],
-            height_range_m: [f32::MAX, f32::MIN],
             survey: (!self.bed.is_procedural()).then(|| Box::new(survey)),
+            colour,
             content: 0,
         });
         let mut plots = Plots::new(&self.bed, &needs, tiles);
@@ -151,8 +166,6 @@ impl Generator {
                 survey.sea_level_m[at] = narrow(ground.sea_level_m);
                 survey.origin[at] = ground.origin;
             }
-            let [low, high] = page.height_range_m;
-            page.height_range_m = [low.min(page.heights_m[at]), high.max(page.heights_m[at])];
             if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
                 let place = j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE;
                 page.bounds[place] = self.bound(page, point, &ground, plots);
@@ -311,6 +324,9 @@ fn content_of(page: &Page) -> u64 {
     for bound in &page.bounds {
         let bits = [bound.error_odd_m, bound.error_even_m, bound.variation_m].map(f32::to_bits);
         bits.into_iter().for_each(|b| chain.add(u64::from(b)));
+    }
+    if let Some(colour) = &page.colour {
+        chain.add(colour.content);
     }
     chain.0
 }

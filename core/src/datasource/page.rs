@@ -1,13 +1,15 @@
-//! One page: heights, normals, hidden layers and bounds of a cell of the octahedral square.
+//! One page: heights, normals, hidden layers, bounds, colour of a cell of the octahedral square.
 //!
 //! In:    filled by `generate`, on the host's loader threads.
 //! Out:   samples by lattice point; bounds around a lattice point.
 //! Keeps: its own arrays.
 //! Not here: which pages are resident (`pages`).
 
+use super::colour::ColourTile;
 use super::key::{PAGE_SIDE, PageKey};
 use crate::lattice::unfold;
 use glam::IVec3;
+use std::sync::Arc;
 
 /// Samples of a page.
 pub const SAMPLES: usize = PAGE_SIDE * PAGE_SIDE;
@@ -65,7 +67,7 @@ pub struct Survey {
     pub origin: [Origin; SAMPLES],
 }
 
-/// One page: about 54 KiB, all of it inline but the survey.
+/// One page: about 54 KiB, all of it inline but the survey and the colour.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Page {
     /// Which cell.
@@ -79,10 +81,11 @@ pub struct Page {
     pub layers: [[u8; 4]; SAMPLES],
     /// Bounds; (i, j) at `j * BOUND_SIDE + i`.
     pub bounds: [Bound; BOUND_SIDE * BOUND_SIDE],
-    /// Least and greatest sample in metres.
-    pub height_range_m: [f32; 2],
     /// What real elevation knows; pages of procedural planets have none.
     pub survey: Option<Box<Survey>>,
+    /// The imagery of exactly this cell. Cells deeper than a scene's imagery have none: there the
+    /// nearest ancestor's is seen.
+    pub colour: Option<Arc<ColourTile>>,
     /// Hash of all of the above.
     pub content: u64,
 }
@@ -134,5 +137,16 @@ impl Page {
         debug_assert!((u - u0) % step == 0 && (v - v0) % step == 0, "{point} is no sample");
         let place = |along: i32| usize::try_from(along / step).expect("the point is in the page");
         (place(u - u0), place(v - v0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_without_imagery_costs_what_it_did_before_there_was_any() {
+        // So many bytes divide a scene's budget into pages, and flights' digests hang on how many.
+        assert_eq!(size_of::<Page>(), 54_200);
     }
 }

@@ -8,6 +8,7 @@
 use crate::camera::{Camera, View};
 use crate::datasource::{Page, PageKey};
 use crate::digest::FrameDigest;
+use crate::mesh::drape::NewTile;
 use std::sync::Arc;
 
 /// What one frame starts from.
@@ -38,6 +39,8 @@ pub struct FrameOutput {
     pub evicted: Vec<Arc<Page>>,
     /// Patch slots whose vertices were written in this frame: what a renderer must upload.
     pub built: Vec<u32>,
+    /// Tiles of imagery that are new in their layers: what a renderer must upload.
+    pub tiles: Vec<NewTile>,
     /// Draws of each view, in the order of the input's views.
     pub views: Vec<ViewDraws>,
     /// What the state is now.

@@ -10,8 +10,10 @@ pub mod data;
 pub use data::{FrameCounts, FrameInput, FrameOutput, RangeDraws, ViewDraws};
 
 use crate::camera::{Camera, ViewFault};
+use crate::columns::Id;
+use crate::datasource::Page;
 use crate::datasource::generate::Generator;
-use crate::datasource::pages::Pages;
+use crate::datasource::pages::{Admission, Pages};
 use crate::digest::Chain;
 use crate::limits::Limits;
 use crate::lod::cover::{Cover, Planet, judge};
@@ -19,11 +21,14 @@ use crate::lod::refine::{Knobs, Mesh, Refinement};
 use crate::lod::screen_error::{Horizon, Sight, motion_between};
 use crate::lod::{audit, want};
 use crate::mesh::build::{BLOCK, Block as BuildBlock, Ground, build_block, store};
+use crate::mesh::drape::{Drape, NewTile, PatchDrape};
+use crate::mesh::morph::{Moment, Morphing};
 use crate::mesh::patches::Patches;
 use crate::mesh::place::{self, BLOCK_GRAIN, LIST_GRAIN, Placed, empty_draws, place_blocks};
 use crate::settings::SceneSettings;
 use overfly_jobs::{Graph, Span, StageId, Team};
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
+use std::sync::Arc;
 
 /// Names of the stages, in the order in which data moves.
 pub const STAGES: [Span; 6] = [CAMERA, ADMIT, PRIORITISE, REFINE, BUILD, PLACE];
@@ -44,15 +49,39 @@ pub struct Lod {
     pub mesh: Mesh,
     /// Bounds, pages and patches of each diamond.
     pub cover: Cover,
-    /// The sights of the last frame, from which motion is counted.
+    /// The sights of the last frame that was not held, from which motion is counted.
     before: Vec<Sight>,
     judges_all: bool,
 }
 
+/// What this frame's views see from.
 #[derive(Default)]
-struct Eyes {
+pub(crate) struct Eyes {
     cameras: Vec<Camera>,
-    sights: Vec<Sight>,
+    /// As the LOD judges them.
+    pub(crate) sights: Vec<Sight>,
+}
+
+/// The frame's clock: the input's time, but that it never runs back. Where the input does, as in a
+/// seek, all morphs are over: so splits along a diamond's ancestors stay in the order of time.
+#[derive(Default)]
+struct Clock {
+    input_ms: Option<u32>,
+    now_ms: u32,
+}
+
+impl Clock {
+    /// Goes on to an input's time, or by `morph_ms` where that lies behind or half the range on.
+    fn advance(&mut self, input_ms: u32, morph_ms: u32) -> u32 {
+        let step_ms = match self.input_ms.replace(input_ms) {
+            None => input_ms,
+            Some(before) => Some(input_ms.wrapping_sub(before))
+                .filter(|&step_ms| step_ms <= u32::MAX / 2)
+                .unwrap_or(morph_ms),
+        };
+        self.now_ms = self.now_ms.wrapping_add(step_ms);
+        self.now_ms
+    }
 }
 
 /// The terrain of one scene: everything that lives from frame to frame.
@@ -60,7 +89,12 @@ pub struct Terrain {
     settings: SceneSettings,
     limits: Limits,
     horizon: Horizon,
+    /// How vertices morph; `None` where `morph_s` is 0.
+    morphing: Option<Morphing>,
+    /// Imagery over the patches; `None` where the scene has none.
+    drape: Mutex<Option<Drape>>,
     input: Mutex<FrameInput>,
+    clock: Mutex<Clock>,
     eyes: RwLock<Eyes>,
     pages: RwLock<Pages>,
     lod: RwLock<Lod>,
@@ -74,21 +108,33 @@ impl Terrain {
     /// The terrain of a scene, with no page yet; every pool is allocated here.
     pub fn new(settings: &SceneSettings, generator: &Generator) -> Self {
         let limits = Limits::of(settings);
-        let patches = Patches::new(settings.lod.patch_depth, limits.leaves);
+        let patch_depth = settings.lod.patch_depth;
+        let morphing = Morphing::new(settings.lod.morph_s, patch_depth);
+        let morphs = morphing.is_some();
+        let arena = if morphs { Patches::morphing } else { Patches::new };
+        let mut patches = arena(patch_depth, limits.leaves);
+        let drape = (!settings.imagery.is_empty()).then(|| Drape::new(limits.pages));
+        if drape.is_some() {
+            patches.drapes = vec![PatchDrape::NONE; limits.leaves as usize];
+        }
         Self {
             horizon: Horizon::new(&settings.body, generator.surface_range_m()),
+            morphing,
+            drape: Mutex::new(drape),
             input: Mutex::default(),
+            clock: Mutex::default(),
             eyes: RwLock::default(),
             pages: RwLock::new(Pages::new(limits.pages)),
             lod: RwLock::new(Lod {
                 mesh: Mesh::new(limits.diamonds, knobs_of(settings, &limits)),
-                cover: Cover::new(limits.diamonds),
+                cover: Cover::new(limits.diamonds, morphs),
                 before: Vec::new(),
                 judges_all: false,
             }),
             build_blocks: Mutex::new(BuildBlock::for_patches(
                 limits.built,
                 patches.vertices_per_patch,
+                morphs,
             )),
             placed: Mutex::default(),
             patches: RwLock::new(patches),
@@ -130,6 +176,11 @@ impl Terrain {
         self.patches.read()
     }
 
+    /// Tiles of imagery in their layers, for a renderer that comes late.
+    pub fn tiles(&self) -> Vec<NewTile> {
+        self.drape.lock().as_ref().map_or_else(Vec::new, |drape| drape.tiles().collect())
+    }
+
     /// Diamonds, agenda and cover, for tests and tools.
     pub fn lod(&self) -> RwLockReadGuard<'_, Lod> {
         self.lod.read()
@@ -143,6 +194,11 @@ impl Terrain {
     /// Output of the frame in the making, for a stage after `mesh.place`.
     pub fn output(&self) -> &Mutex<FrameOutput> {
         &self.output
+    }
+
+    /// The eyes of the last frame.
+    pub(crate) fn eyes(&self) -> RwLockReadGuard<'_, Eyes> {
+        self.eyes.read()
     }
 
     /// Whether every frame judges every diamond, whatever the motion: the same mesh for more work,
@@ -193,9 +249,18 @@ fn admit(terrain: &Terrain) {
     // The list of arrived pages is taken out of the input, so that `see` may read the views.
     let mut arrived = core::mem::take(&mut terrain.input.lock().arrived);
     output.evicted.clear();
-    output.time_ms = milliseconds(terrain.input.lock().time_s);
+    let (time_s, held) = {
+        let input = terrain.input.lock();
+        (input.time_s, input.hold_lod)
+    };
+    let morph_ms = terrain.morphing.as_ref().map_or(0, |morphing| morphing.duration_ms);
+    output.time_ms = terrain.clock.lock().advance(milliseconds(time_s), morph_ms);
     let frame = output.frame;
-    let done = pages.admit(&mut arrived, frame, &mut output.evicted);
+    let done = if held {
+        refuse_all(&mut arrived, &mut output.evicted)
+    } else {
+        pages.admit(&mut arrived, frame, &mut output.evicted)
+    };
     terrain.input.lock().arrived = arrived;
     output.counts = FrameCounts {
         admitted: done.admitted,
@@ -205,6 +270,13 @@ fn admit(terrain: &Terrain) {
         ..FrameCounts::default()
     };
     output.digest.pages = pages.digest();
+}
+
+/// While the mesh is held no page comes in and none goes: whoever needs one asks for it later.
+fn refuse_all(arrived: &mut Vec<Arc<Page>>, evicted: &mut Vec<Arc<Page>>) -> Admission {
+    let refused = u32::try_from(arrived.len()).expect("few pages");
+    evicted.append(arrived);
+    Admission { refused, ..Admission::default() }
 }
 
 /// A time in whole milliseconds, modulo 2^32; 0 where it is not finite.
@@ -227,6 +299,10 @@ fn knobs_of(settings: &SceneSettings, limits: &Limits) -> Knobs {
 
 /// Judges, in parallel, the diamonds that the motion of the views made due.
 fn prioritise(terrain: &Terrain, team: &Team<'_>) {
+    if terrain.input.lock().hold_lod {
+        // The sights of the last frame that judged stay: motion goes on from there.
+        return;
+    }
     let eyes = terrain.eyes.read();
     let mut lod = terrain.lod.write();
     let Lod { mesh, cover, before, judges_all } = &mut *lod;
@@ -251,6 +327,12 @@ fn refine_surface(terrain: &Terrain) {
     let Lod { mesh, cover, .. } = &mut *lod;
     let output = &mut *output;
     output.wanted.clear();
+    if terrain.input.lock().hold_lod {
+        let patch_depth = terrain.settings.lod.patch_depth;
+        count(&mut output.counts, mesh, &Refinement::default(), patch_depth);
+        output.digest.mesh = cover.digest();
+        return;
+    }
     let mut planet = Planet {
         cover,
         pages: &mut pages,
@@ -261,6 +343,7 @@ fn refine_surface(terrain: &Terrain) {
         sea: terrain.settings.sea,
         lod: &terrain.settings.lod,
         frame: output.frame,
+        now_ms: output.time_ms,
     };
     let mut done = Refinement::default();
     if mesh.diamonds.base().is_none()
@@ -307,7 +390,10 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     let SceneSettings { body, sea, .. } = &terrain.settings;
     let Lod { mesh, cover, .. } = &*lod;
     let diamonds = &mesh.diamonds;
-    let ground = Ground { diamonds, cover, pages: &pages, body, sea: *sea };
+    let now_ms = output.time_ms;
+    let moment = terrain.morphing.as_ref().map(|morphing| Moment { morphing, now_ms });
+    let ground = Ground { diamonds, cover, pages: &pages, body, sea: *sea, moment };
+    let output = &mut *output;
     let slots = &output.built;
     let used = &mut blocks[..slots.len().div_ceil(BLOCK)];
     team.for_each_chunk(used, 1, |first, chunk| {
@@ -317,7 +403,29 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     });
     store(&mut patches, slots, used);
     output.counts.built = u32::try_from(slots.len()).expect("slots are counted in u32");
+    if let Some(drape) = &mut *terrain.drape.lock() {
+        drape_over(drape, (&mut patches, &ground), output);
+    }
     output.digest.vertices = patches.digest();
+}
+
+/// What lies over the new patches.
+fn drape_over(
+    drape: &mut Drape,
+    (patches, ground): (&mut Patches, &Ground<'_>),
+    output: &mut FrameOutput,
+) {
+    let FrameOutput { built, tiles, time_ms, .. } = output;
+    tiles.clear();
+    for &slot in &*built {
+        let leaf = patches.leaf[slot as usize].expect("only live slots are built");
+        let (id, side) = (Id::new(leaf.diamond), usize::from(leaf.side));
+        let page = ground.cover.pages[id][side].expect("a leaf's side is there");
+        let corners = ground.diamonds.shape(id).triangle(side);
+        let over =
+            drape.over(ground.pages, (page, corners), (patches.patch_depth, *time_ms), tiles);
+        patches.drapes[slot as usize] = over;
+    }
 }
 
 /// Draws of every view, in parallel over blocks of slots, then over parts of the lists.

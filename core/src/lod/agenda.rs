@@ -287,6 +287,11 @@ impl Agenda {
         self.bins.push(diamonds, WAITING, id);
     }
 
+    /// Adds the leaves that could not be split in the last frame to a list.
+    pub fn list_waiting(&self, out: &mut Vec<DiamondId>) {
+        self.bins.list(WAITING, out);
+    }
+
     /// Takes a diamond from its seat, if it has one.
     pub fn unseat(&mut self, diamonds: &mut Diamonds, id: DiamondId) {
         match diamonds[id].seat {

@@ -40,6 +40,7 @@ pub fn consistent(
     let mut leaves = 0;
     for id in diamonds.ids() {
         links(diamonds, id)?;
+        birth((diamonds, cover), id)?;
         for side in 0..2 {
             leaves += leaf((diamonds, cover), id, side, patches)?;
             let page = cover.pages[id][side];
@@ -89,6 +90,17 @@ fn links(diamonds: &Diamonds, id: DiamondId) -> Result<(), String> {
     ensure(split_kids == counted, || format!("{id:?} miscounts split kids"))?;
     let all = kids.iter().flatten().count() == 4;
     ensure(!record.is_split() || all, || format!("{id:?} is split and lacks a kid"))
+}
+
+/// No diamond was split before its parents were: what morphing vertices rely on.
+fn birth((diamonds, cover): (&Diamonds, &Cover), id: DiamondId) -> Result<(), String> {
+    if cover.split_ms.as_slice().is_empty() || !diamonds[id].is_split() {
+        return Ok(());
+    }
+    let mut parents = diamonds[id].parents().into_iter().flatten();
+    let since_ms = |parent| cover.split_ms[id].wrapping_sub(cover.split_ms[parent]);
+    let younger = parents.find(|&parent| since_ms(parent) > u32::MAX / 2);
+    ensure(younger.is_none(), || format!("{younger:?} was split after its kid {id:?}"))
 }
 
 fn leaf(

@@ -28,16 +28,20 @@ pub struct Cover {
     pub pages: Column<Diamond, [Option<Id<Page>>; 2]>,
     /// Patch slot of each side's leaf triangle; empty unless it is a leaf.
     pub patches: Column<Diamond, [Option<u32>; 2]>,
+    /// When a split diamond was split, on the frame's clock in milliseconds modulo 2^32; without
+    /// any place where the scene does not morph.
+    pub split_ms: Column<Diamond, u32>,
     digest: u64,
 }
 
 impl Cover {
-    /// Columns for as many diamonds as there can be.
-    pub fn new(capacity: u32) -> Self {
+    /// Columns for as many diamonds as there can be, in a scene that morphs or does not.
+    pub fn new(capacity: u32, morphs: bool) -> Self {
         Self {
             region: Column::new(capacity, Region::default),
             pages: Column::new(capacity, || [None; 2]),
             patches: Column::new(capacity, || [None; 2]),
+            split_ms: Column::new(if morphs { capacity } else { 0 }, || 0),
             digest: 0,
         }
     }
@@ -63,6 +67,60 @@ pub fn judge(
     }
 }
 
+/// Which pages serve which triangles.
+#[derive(Clone, Copy)]
+pub struct Serving<'a> {
+    /// What hangs on the diamonds.
+    pub cover: &'a Cover,
+    /// The resident pages.
+    pub pages: &'a Pages,
+    /// How often a leaf is halved to be drawn.
+    pub patch_depth: u8,
+}
+
+impl Serving<'_> {
+    /// Whether the kids of `id` could be made now, its parents being split.
+    ///
+    /// # Errors
+    /// The page that is lacking.
+    pub fn kids_ready(&self, diamonds: &Diamonds, id: DiamondId) -> Result<(), PageKey> {
+        self.page_of_kids(diamonds, id, 0)?;
+        self.page_of_kids(diamonds, id, 1)?;
+        Ok(())
+    }
+
+    /// The page that serves triangle `side` of `id`, or will once that parent is split.
+    fn page_of(
+        &self,
+        diamonds: &Diamonds,
+        id: DiamondId,
+        side: usize,
+    ) -> Result<Id<Page>, PageKey> {
+        if let Some(page) = self.cover.pages[id][side] {
+            return Ok(page);
+        }
+        let record = &diamonds[id];
+        let parent = record.parents()[side].expect("base diamonds have both sides");
+        self.page_of_kids(diamonds, parent, record.slot(side) / 2)
+    }
+
+    /// The page that serves the kids' triangles on one side of `id`, or the key that is lacking.
+    fn page_of_kids(
+        &self,
+        diamonds: &Diamonds,
+        id: DiamondId,
+        side: usize,
+    ) -> Result<Id<Page>, PageKey> {
+        let page = self.page_of(diamonds, id, side)?;
+        let key = self.pages.get(page).key;
+        if page_depth(diamonds[id].level() + 1, self.patch_depth) == key.depth() {
+            return Ok(page);
+        }
+        let child = child_around(key, diamonds.shape(id).triangle(side));
+        self.pages.children[page][child].ok_or_else(|| key.child(child))
+    }
+}
+
 /// All that a split or merge over the planet reads or changes besides the diamonds.
 pub struct Planet<'a> {
     /// What hangs on the diamonds.
@@ -83,6 +141,8 @@ pub struct Planet<'a> {
     pub lod: &'a LodSettings,
     /// This frame's number.
     pub frame: u64,
+    /// Its time, which splits are noted with.
+    pub now_ms: u32,
 }
 
 impl Rule for Planet<'_> {
@@ -91,15 +151,17 @@ impl Rule for Planet<'_> {
     }
 
     fn kids_ready(&self, diamonds: &Diamonds, id: DiamondId) -> Result<(), PageKey> {
-        self.page_of_kids(diamonds, id, 0)?;
-        self.page_of_kids(diamonds, id, 1)?;
-        Ok(())
+        self.serving().kids_ready(diamonds, id)
     }
 
     fn follow_split(&mut self, diamonds: &Diamonds, id: DiamondId) {
+        if let Some(split_ms) = self.cover.split_ms.as_mut_slice().get_mut(id.index() as usize) {
+            *split_ms = self.now_ms;
+        }
         for side in 0..2 {
             self.remove_leaf(diamonds, id, side);
-            let page = self.page_of_kids(diamonds, id, side).expect("the plan found every page");
+            let page = self.serving().page_of_kids(diamonds, id, side);
+            let page = page.expect("the plan found every page");
             for edge in [2 * side, 2 * side + 1] {
                 let kid = diamonds[id].kids()[edge].expect("a split diamond has all kids");
                 self.cover_side(diamonds, kid, (diamonds[kid].side_of(id), page));
@@ -121,6 +183,10 @@ impl Rule for Planet<'_> {
 }
 
 impl Planet<'_> {
+    fn serving(&self) -> Serving<'_> {
+        Serving { cover: self.cover, pages: self.pages, patch_depth: self.lod.patch_depth }
+    }
+
     /// Covers the base octahedron with the four root pages.
     pub fn follow_base(&mut self, diamonds: &Diamonds, base: [DiamondId; 4], roots: [Id<Page>; 4]) {
         for (id, root) in base.into_iter().zip(roots) {
@@ -155,37 +221,6 @@ impl Planet<'_> {
         self.patches.give_back(slot);
         let key = leaf_key(diamonds[id].key(), side);
         self.cover.digest = self.cover.digest.wrapping_sub(mix(key));
-    }
-
-    /// The page that serves triangle `side` of `id`, or will once that parent is split.
-    fn page_of(
-        &self,
-        diamonds: &Diamonds,
-        id: DiamondId,
-        side: usize,
-    ) -> Result<Id<Page>, PageKey> {
-        if let Some(page) = self.cover.pages[id][side] {
-            return Ok(page);
-        }
-        let record = &diamonds[id];
-        let parent = record.parents()[side].expect("base diamonds have both sides");
-        self.page_of_kids(diamonds, parent, record.slot(side) / 2)
-    }
-
-    /// The page that serves the kids' triangles on one side of `id`, or the key that is lacking.
-    fn page_of_kids(
-        &self,
-        diamonds: &Diamonds,
-        id: DiamondId,
-        side: usize,
-    ) -> Result<Id<Page>, PageKey> {
-        let page = self.page_of(diamonds, id, side)?;
-        let key = self.pages.get(page).key;
-        if page_depth(diamonds[id].level() + 1, self.lod.patch_depth) == key.depth() {
-            return Ok(page);
-        }
-        let child = child_around(key, diamonds.shape(id).triangle(side));
-        self.pages.children[page][child].ok_or_else(|| key.child(child))
     }
 
     /// The bounds of a diamond: what its page knows, within what both parents allow.

@@ -200,6 +200,11 @@ impl Sight {
         above_m.min(inside_m)
     }
 
+    /// Whether this view may see any of the region.
+    pub fn sees(&self, region: &Region) -> bool {
+        self.seen_by_m(region, &self.look(region)) >= 0.0
+    }
+
     /// Error bound of the region on this view's screen, in pixels.
     pub fn error_px(&self, region: &Region) -> f64 {
         let look = self.look(region);

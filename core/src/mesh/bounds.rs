@@ -80,6 +80,13 @@ impl Bounds {
         self.radius_m[at] = radius_m;
     }
 
+    /// Centre and radius of one slot of the group; `None` where there is no sphere.
+    pub fn sphere(&self, at: usize) -> Option<(DVec3, f64)> {
+        let centre = DVec3::new(self.x_m[at], self.y_m[at], self.z_m[at]);
+        let radius_m = self.radius_m[at];
+        (radius_m >= 0.0).then_some((centre, radius_m))
+    }
+
     /// Takes the sphere of one slot away.
     pub fn clear(&mut self, at: usize) {
         self.set(at, DVec3::ZERO, NOWHERE_M);

@@ -5,7 +5,8 @@
 //! Keeps: blocks of scratch, one a chunk, so that chunks are independent.
 //! Not here: uploading (`overfly_render_vk`), the index pattern (`topology`).
 
-use super::patches::{BuiltPatch, PatchVertex, Patches};
+use super::morph::{self, Built, Moment, Ways};
+use super::patches::{BuiltPatch, PatchMorph, PatchVertex, Patches};
 use super::topology::segments;
 use crate::columns::Id;
 use crate::datasource::Page;
@@ -13,9 +14,9 @@ use crate::datasource::pages::Pages;
 use crate::digest::{Chain, mix};
 use crate::geodesy::{Ecef, Ellipsoid, TwoFloat};
 use crate::lattice::normal_of;
-use crate::lod::Diamonds;
 use crate::lod::cover::Cover;
 use crate::lod::diamonds::leaf_key;
+use crate::lod::{DiamondId, Diamonds};
 use glam::{DVec3, IVec3};
 
 /// Patches in one block: at k = 4 some 10 µs of work.
@@ -30,12 +31,15 @@ pub struct Block {
     surfaces_m: Vec<f64>,
     /// Body-fixed positions of one patch's vertices.
     places: Vec<DVec3>,
+    /// Where the vertices begin; empty where the scene does not morph, as is what follows.
+    morphs: Vec<PatchMorph>,
+    ways: Option<Ways>,
     built: [BuiltPatch; BLOCK],
 }
 
 impl Block {
     /// As many blocks as `patches` can need.
-    pub fn for_patches(patches: u32, vertices_per_patch: u32) -> Vec<Self> {
+    pub fn for_patches(patches: u32, vertices_per_patch: u32, morphs: bool) -> Vec<Self> {
         let vertices = vec![PatchVertex::EMPTY; BLOCK * vertices_per_patch as usize];
         let points = vec![IVec3::ZERO; vertices.len()];
         let places = vec![DVec3::ZERO; vertices_per_patch as usize];
@@ -44,6 +48,8 @@ impl Block {
             points: points.clone(),
             surfaces_m: vec![0.0; points.len()],
             places: places.clone(),
+            morphs: if morphs { vec![PatchMorph::EMPTY; vertices.len()] } else { Vec::new() },
+            ways: morphs.then(|| Ways::new(vertices_per_patch)),
             built: [BuiltPatch::default(); BLOCK],
         };
         (0..(patches as usize).div_ceil(BLOCK)).map(|_| block()).collect()
@@ -62,12 +68,16 @@ pub struct Ground<'a> {
     pub body: &'a Ellipsoid,
     /// Whether ground below height 0 is covered by water, whose surface is drawn instead.
     pub sea: bool,
+    /// How vertices morph, if they do.
+    pub moment: Option<Moment<'a>>,
 }
 
 /// A leaf triangle to build.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     page: &'a Page,
+    diamond: DiamondId,
+    side: usize,
     corners: [IVec3; 3],
     key: u64,
 }
@@ -91,20 +101,38 @@ pub fn build_block(ground: &Ground<'_>, patches: &Patches, slots: &[u32], block:
     {
         read_samples(task, (patches.patch_depth, ground.sea), vertices, (points, surfaces_m));
     }
-    let vertices = block.vertices.chunks_exact_mut(per_patch);
-    let places = block.points.chunks_exact(per_patch).zip(block.surfaces_m.chunks_exact(per_patch));
-    let targets = vertices.zip(places).zip(&mut block.built);
-    for (task, ((vertices, (points, surfaces_m)), built)) in tasks().zip(targets) {
-        let heights = points.iter().zip(surfaces_m);
-        for ((vertex, (&point, &surface_m)), place) in
-            vertices.iter_mut().zip(heights).zip(&mut block.places)
-        {
-            let normal = normal_of(point);
-            *place = ground.body.surface_from_normal(normal) + normal * surface_m;
-            vertex.position = Ecef(*place).two_float();
-        }
-        *built = bound_and_hash(task.key, patches.patch_depth, vertices, &block.places);
+    let tasks = tasks().copied().enumerate();
+    tasks.for_each(|(at, task)| finish(ground, patches.patch_depth, (at, &task), block));
+}
+
+/// Third pass over patch `at` of a block: places, where they begin, bounds, hash.
+fn finish(ground: &Ground<'_>, patch_depth: u8, (at, task): (usize, &Task<'_>), block: &mut Block) {
+    let n = block.places.len();
+    let all = at * n..(at + 1) * n;
+    let (points, vertices) = (&block.points[all.clone()], &mut block.vertices[all.clone()]);
+    let heights = points.iter().zip(&block.surfaces_m[all.clone()]);
+    for ((vertex, (&point, &surface_m)), place) in
+        vertices.iter_mut().zip(heights).zip(&mut block.places)
+    {
+        let normal = normal_of(point);
+        *place = ground.body.surface_from_normal(normal) + normal * surface_m;
+        vertex.position = Ecef(*place).two_float();
     }
+    let mut morphs: &mut [PatchMorph] = &mut [];
+    if let (Some(moment), Some(ways)) = (ground.moment, &mut block.ways) {
+        let Task { diamond, side, corners, .. } = *task;
+        let built = Built { diamond, side, corners, points, places: &block.places, vertices };
+        morphs = &mut block.morphs[all];
+        morph::write(ground, moment, &built, ways, morphs);
+    }
+    block.built[at] = bound_and_hash((task.key, patch_depth), vertices, &block.places, morphs);
+}
+
+/// The body-fixed place of a lattice point of a page: the bits that every patch gives it.
+pub fn place_of(ground: &Ground<'_>, page: &Page, point: IVec3) -> DVec3 {
+    let normal = normal_of(point);
+    let surface_m = page.surface_m(page.sample_index(point), ground.sea);
+    ground.body.surface_from_normal(normal) + normal * surface_m
 }
 
 fn task_of<'a>(ground: &Ground<'a>, patches: &Patches, slot: u32) -> Task<'a> {
@@ -112,6 +140,8 @@ fn task_of<'a>(ground: &Ground<'a>, patches: &Patches, slot: u32) -> Task<'a> {
     let (id, side) = (Id::new(leaf.diamond), usize::from(leaf.side));
     Task {
         page: ground.pages.get(ground.cover.pages[id][side].expect("a leaf's side is there")),
+        diamond: id,
+        side,
         corners: ground.diamonds.shape(id).triangle(side),
         key: leaf_key(ground.diamonds[id].key(), side),
     }
@@ -140,12 +170,13 @@ fn read_samples(
     }
 }
 
-/// Sphere and hash of a patch whose vertices lie at `places`, row by row from the apex.
+/// Sphere and hash of a patch whose vertices lie at `places`, row by row from the apex. The sphere
+/// also holds where they begin, and so all places between.
 fn bound_and_hash(
-    key: u64,
-    patch_depth: u8,
+    (key, patch_depth): (u64, u8),
     vertices: &[PatchVertex],
     places: &[DVec3],
+    morphs: &[PatchMorph],
 ) -> BuiltPatch {
     let last_row = &places[places.len() - 1 - segments(patch_depth) as usize..];
     let centre = (places[0] + last_row[0] + last_row[last_row.len() - 1]) / 3.0;
@@ -154,6 +185,11 @@ fn bound_and_hash(
     for (vertex, place) in vertices.iter().zip(places) {
         radius_m = radius_m.max((*place - centre).length());
         hash(vertex, &mut chain);
+    }
+    for (morph, place) in morphs.iter().zip(places) {
+        let from = DVec3::from_array(morph.from_m.map(f64::from));
+        radius_m = radius_m.max((*place + from - centre).length());
+        hash_morph(morph, &mut chain);
     }
     BuiltPatch { centre, radius_m, content: chain.0 | 1 }
 }
@@ -166,15 +202,32 @@ pub fn store(patches: &mut Patches, slots: &[u32], blocks: &[Block]) {
         for (&slot, (vertices, &built)) in slots.iter().zip(done) {
             patches.fill(slot, built, vertices);
         }
+        for (&slot, morphs) in slots.iter().zip(block.morphs.chunks_exact(per_patch)) {
+            patches.fill_morphs(slot, morphs);
+        }
     }
 }
 
 fn hash(vertex: &PatchVertex, chain: &mut Chain) {
-    let pair = |a: f32, b: f32| u64::from(a.to_bits()) << 32 | u64::from(b.to_bits());
     let TwoFloat { hi, lo } = vertex.position;
     for axis in 0..3 {
         chain.add(pair(hi[axis] + 0.0, lo[axis] + 0.0));
     }
-    let [a, b] = vertex.normal_oct.map(|c| u64::from(c.cast_unsigned()));
-    chain.add(a << 48 | b << 32 | u64::from(u32::from_le_bytes(vertex.layers)));
+    chain.add(shading(vertex.normal_oct, vertex.layers));
+}
+
+fn hash_morph(morph: &PatchMorph, chain: &mut Chain) {
+    let [x, y, z] = morph.from_m;
+    chain.add(pair(x + 0.0, y + 0.0));
+    chain.add(u64::from((z + 0.0).to_bits()) << 32 | u64::from(morph.born_ms));
+    chain.add(shading(morph.normal_oct, morph.layers));
+}
+
+fn pair(a: f32, b: f32) -> u64 {
+    u64::from(a.to_bits()) << 32 | u64::from(b.to_bits())
+}
+
+fn shading(normal_oct: [i16; 2], layers: [u8; 4]) -> u64 {
+    let [a, b] = normal_oct.map(|c| u64::from(c.cast_unsigned()));
+    a << 48 | b << 32 | u64::from(u32::from_le_bytes(layers))
 }

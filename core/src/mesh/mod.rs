@@ -7,7 +7,9 @@
 
 pub mod bounds;
 pub mod build;
+pub mod drape;
 mod lists;
+pub mod morph;
 pub mod patches;
 pub mod place;
 pub mod topology;

@@ -6,6 +6,7 @@
 //! Not here: how a vertex is computed (`build`), the shared index pattern (`topology`).
 
 use super::bounds::{Bounds, GROUP};
+use super::drape::PatchDrape;
 use crate::geodesy::TwoFloat;
 use glam::DVec3;
 
@@ -39,8 +40,10 @@ impl PatchVertex {
 /// Where a vertex of a morphing scene begins: 24 bytes beside its [`PatchVertex`].
 ///
 /// At time t it is drawn at its own place plus `from_m` times what is left of its way, which is
-/// 1 when it is born and 0 from `morph_s` later on; normals and layers are mixed the same way. All
-/// is a function of the lattice point, so that neighbouring patches agree at every moment.
+/// 1 when it is born and 0 from `morph_s` later on ([`PatchMorph::left`]); normals and layers are
+/// mixed the same way. All is a function of the lattice point, so that neighbouring patches agree
+/// at every moment. What had arrived when its patch was built has an offset of 0, its own normal
+/// and layers, and 0 for its birth.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(C)]
 pub struct PatchMorph {
@@ -50,7 +53,8 @@ pub struct PatchMorph {
     pub normal_oct: [i16; 2],
     /// Hidden layers there.
     pub layers: [u8; 4],
-    /// Time of the flight at which it was born, in milliseconds modulo 2^32.
+    /// Time at which it was born, in milliseconds modulo 2^32: what
+    /// [`time_ms`](crate::frame::FrameOutput::time_ms) was then.
     pub born_ms: u32,
 }
 
@@ -78,6 +82,8 @@ pub struct Patches {
     pub vertices: Vec<PatchVertex>,
     /// Where these vertices begin, in the same places; empty where the scene does not morph.
     pub morphs: Vec<PatchMorph>,
+    /// What lies over each slot; empty where the scene has no imagery.
+    pub drapes: Vec<PatchDrape>,
     /// Bounding spheres, by group.
     pub bounds: Vec<Bounds>,
     /// How often a slot of each group was filled or given back, for who keeps what follows from it.
@@ -115,6 +121,7 @@ impl Patches {
             leaf: vec![None; slots],
             vertices: vec![PatchVertex::EMPTY; slots * vertices_per_patch as usize],
             morphs: Vec::new(),
+            drapes: Vec::new(),
             bounds: vec![Bounds::EMPTY; slots.div_ceil(GROUP)],
             stamps: vec![0; slots.div_ceil(GROUP)],
             content: vec![0; slots],
@@ -124,6 +131,13 @@ impl Patches {
             used_end: 0,
             digest: 0,
         }
+    }
+
+    /// An arena whose vertices morph: with room for where they begin.
+    pub fn morphing(patch_depth: u8, capacity: u32) -> Self {
+        let mut patches = Self::new(patch_depth, capacity);
+        patches.morphs = vec![PatchMorph::EMPTY; patches.vertices.len()];
+        patches
     }
 
     /// Takes a free slot for `leaf`: the one given back last, else the first never used.
@@ -173,6 +187,12 @@ impl Patches {
         self.content[at] = built.content;
     }
 
+    /// Fills in where the vertices of a slot begin.
+    pub fn fill_morphs(&mut self, slot: u32, morphs: &[PatchMorph]) {
+        let n = self.vertices_per_patch as usize;
+        self.morphs[slot as usize * n..][..n].copy_from_slice(morphs);
+    }
+
     /// Sum of the hashes of all live patches.
     pub fn digest(&self) -> u64 {
         self.digest
@@ -192,6 +212,18 @@ impl Patches {
     pub fn vertices_of(&self, slot: u32) -> &[PatchVertex] {
         let n = self.vertices_per_patch as usize;
         &self.vertices[slot as usize * n..][..n]
+    }
+
+    /// Centre and radius of the bounding sphere of one slot; `None` while it shows nothing.
+    pub fn sphere(&self, slot: u32) -> Option<(DVec3, f64)> {
+        let (group, at) = group_of(slot);
+        self.bounds[group].sphere(at)
+    }
+
+    /// Where the vertices of one slot begin; empty where the scene does not morph.
+    pub fn morphs_of(&self, slot: u32) -> &[PatchMorph] {
+        let n = self.vertices_per_patch as usize;
+        self.morphs.get(slot as usize * n..).map_or(&[], |morphs| &morphs[..n])
     }
 }
 

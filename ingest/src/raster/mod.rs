@@ -7,7 +7,7 @@
 
 mod error;
 mod flat_png;
-mod geotiff;
+pub(crate) mod geotiff;
 mod grid;
 mod hgt;
 mod rows;

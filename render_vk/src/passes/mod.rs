@@ -9,11 +9,14 @@ mod overlay;
 mod sky;
 pub(crate) mod terrain;
 
+use crate::detail::Detail;
 use crate::error::Fault;
+use crate::imagery::Imagery;
 use crate::matrices::RangeTerms;
 use crate::settings::RendererSettings;
 use crate::targets::RangePasses;
 use crate::vk::Device;
+use crate::vk::commands::OneOff;
 use crate::vk::descriptors::{Binding, SetLayout};
 use crate::vk::pipeline::{Layout, Pipeline};
 use ash::vk;
@@ -36,10 +39,13 @@ pub(crate) struct PassInfo<'a> {
     pub(crate) settings: &'a RendererSettings,
 }
 
-/// All pipelines. The range is push constants; set 0 is the view, set 1 what debug views show.
+/// All pipelines. The range is push constants; set 0 is the view and the ground's detail, set 1
+/// what debug views show, set 2 imagery.
 pub(crate) struct Passes {
+    pub(crate) detail: Detail,
     pub(crate) view: SetLayout,
     pub(crate) infos: SetLayout,
+    pub(crate) imagery: Option<SetLayout>,
     pub(crate) layout: Layout,
     pub(crate) terrain: Pipeline,
     pub(crate) sky: Pipeline,
@@ -49,23 +55,30 @@ pub(crate) struct Passes {
 
 impl Passes {
     /// The pipelines of a plain picture.
-    pub(crate) fn new(info: &PassInfo<'_>) -> Result<Self, Fault> {
+    pub(crate) fn new(info: &PassInfo<'_>, one_off: &mut OneOff) -> Result<Self, Fault> {
         let device = info.device;
         let uniform = vk::DescriptorType::UNIFORM_BUFFER;
         let storage = vk::DescriptorType::STORAGE_BUFFER;
         let stages = vk::ShaderStageFlags::FRAGMENT;
-        let view = [Binding { kind: uniform, stages: VIEW_STAGES }];
+        let view = [
+            Binding { kind: uniform, stages: VIEW_STAGES },
+            Binding { kind: vk::DescriptorType::SAMPLED_IMAGE, stages },
+            Binding { kind: vk::DescriptorType::SAMPLER, stages },
+        ];
         let view = SetLayout::new(device, "view", &view)?;
         let infos = SetLayout::new(device, "patch infos", &[Binding { kind: storage, stages }])?;
         let ranges = [vk::PushConstantRange::default().stage_flags(VIEW_STAGES).size(RANGE_BYTES)];
-        let sets = [view.handle, infos.handle];
+        let imagery = info.settings.imagery.then(|| Imagery::layout(device)).transpose()?;
+        let handles = [Some(view.handle), Some(infos.handle), imagery.as_ref().map(|i| i.handle)];
+        let sets: Vec<_> = handles.into_iter().flatten().collect();
         let create = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&sets)
             .push_constant_ranges(&ranges);
         let layout = Layout::new(device, "picture", &create)?;
+        let detail = Detail::new(device, one_off)?;
         let terrain = terrain::pipeline(info, &layout, false)?;
         let sky = sky::pipeline(info, &layout)?;
-        Ok(Self { view, infos, layout, terrain, sky, debug: None, overlay: None })
+        Ok(Self { detail, view, infos, imagery, layout, terrain, sky, debug: None, overlay: None })
     }
 
     /// Makes what a picture needs beyond a plain one, the first time.

@@ -7,7 +7,7 @@
 
 use super::{PassInfo, nearer};
 use crate::error::Fault;
-use crate::shaders;
+use crate::shaders::{self, Ground};
 use crate::vk::pipeline::{GraphicsInfo, Layout, Pipeline};
 use ash::vk;
 use core::mem::offset_of;
@@ -27,7 +27,11 @@ pub(crate) fn pipeline(
     is_debug: bool,
 ) -> Result<Pipeline, Fault> {
     let (placed, morphs) = (info.settings.vertices, info.settings.morphs());
-    let fragment = if is_debug { shaders::debug() } else { shaders::terrain() };
+    let ground = match (is_debug, info.settings.imagery) {
+        (true, _) => Ground::Debug,
+        (false, true) => Ground::Draped,
+        (false, false) => Ground::Plain,
+    };
     let in_eye = placed == VertexPrecision::EyeF64;
     let mut bindings = vec![binding(VERTICES, size_of::<PatchVertex>())];
     let mut attributes = attributes_of_vertices(!in_eye);
@@ -41,7 +45,7 @@ pub(crate) fn pipeline(
     }
     let graphics = GraphicsInfo {
         name: if is_debug { "terrain, debug" } else { "terrain" },
-        words: [&shaders::ground(placed, morphs, is_debug), &fragment],
+        words: [&shaders::ground(placed, morphs, ground), &shaders::terrain(ground)],
         pass: &info.passes.first,
         bindings: &bindings,
         attributes: &attributes,

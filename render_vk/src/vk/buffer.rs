@@ -12,6 +12,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 use overfly_core::inspect::PatchInfo;
+use overfly_core::mesh::drape::PatchDrape;
 use overfly_core::mesh::{PatchMorph, PatchVertex};
 use std::sync::Arc;
 
@@ -26,6 +27,10 @@ pub(crate) unsafe trait Plain: Copy {}
 unsafe impl Plain for PatchVertex {}
 // SAFETY: `repr(C)`, 12 + 4 + 4 + 4 bytes with alignment 4 make 24: no gap.
 unsafe impl Plain for PatchMorph {}
+// SAFETY: `repr(C)`, floats and words of four bytes each.
+unsafe impl Plain for PatchDrape {}
+// SAFETY: bytes have no padding.
+unsafe impl Plain for [u8; 4] {}
 // SAFETY: `repr(C)`, a float and four bytes: no gap.
 unsafe impl Plain for PatchInfo {}
 // SAFETY: `repr(C)`, floats and words of four bytes each.

@@ -89,6 +89,11 @@ impl Device {
         (&self.instance.handle, self.physical)
     }
 
+    /// Whether the device is a program on the host's processor.
+    pub(crate) fn is_software(&self) -> bool {
+        self.instance.properties(self.physical).device_type == vk::PhysicalDeviceType::CPU
+    }
+
     /// What the device can do with optimally tiled images of a format.
     pub(crate) fn image_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let (instance, physical) = self.instance();

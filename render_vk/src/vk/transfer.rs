@@ -11,7 +11,7 @@ use super::pipeline::{Layout, Pipeline};
 use super::{Buffer, Device};
 use ash::vk;
 
-/// Copies staged data to a vertex or index buffer, after earlier draws and before later ones.
+/// Copies staged data to a buffer that vertices are made of, after earlier draws and before later ones.
 pub(crate) fn copies(
     device: &Device,
     buffer: vk::CommandBuffer,
@@ -23,9 +23,13 @@ pub(crate) fn copies(
         .dst_access_mask(vk::AccessFlags::TRANSFER_WRITE);
     let after = vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-        .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ | vk::AccessFlags::INDEX_READ);
+        .dst_access_mask(
+            vk::AccessFlags::VERTEX_ATTRIBUTE_READ
+                | vk::AccessFlags::INDEX_READ
+                | vk::AccessFlags::SHADER_READ,
+        );
     let copy = vk::PipelineStageFlags::TRANSFER;
-    let read = vk::PipelineStageFlags::VERTEX_INPUT;
+    let read = vk::PipelineStageFlags::VERTEX_INPUT | vk::PipelineStageFlags::VERTEX_SHADER;
     // SAFETY: the buffer is being recorded, outside a pass; the regions are inside both buffers
     // and do not overlap; the host wrote `from` before the submit.
     unsafe {
@@ -214,3 +218,85 @@ pub(crate) fn blit(
 
 /// A layout and the accesses in it.
 type Use = (vk::ImageLayout, vk::AccessFlags);
+
+/// A barrier around writes to levels and layers of an image that fragment shaders read.
+fn image_turn<'a>(
+    image: vk::Image,
+    range: vk::ImageSubresourceRange,
+    (from, to): (Use, Use),
+) -> vk::ImageMemoryBarrier<'a> {
+    vk::ImageMemoryBarrier::default()
+        .image(image)
+        .subresource_range(range)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .old_layout(from.0)
+        .src_access_mask(from.1)
+        .new_layout(to.0)
+        .dst_access_mask(to.1)
+}
+
+const SHADER_READ: Use = (vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL, vk::AccessFlags::SHADER_READ);
+
+/// Clears all of a new image to nothing and leaves it for reading in fragment shaders.
+pub(crate) fn make_readable(device: &Device, buffer: vk::CommandBuffer, image: &Image) {
+    let all = image.all();
+    let unknown = (vk::ImageLayout::UNDEFINED, vk::AccessFlags::empty());
+    let written = (vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::AccessFlags::TRANSFER_WRITE);
+    let before = image_turn(image.handle, all, (unknown, written));
+    let after = image_turn(image.handle, all, (written, SHADER_READ));
+    let (copy, read) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::FRAGMENT_SHADER);
+    let flags = vk::DependencyFlags::empty();
+    let nothing = vk::ClearColorValue { float32: [0.0; 4] };
+    let device = &device.handle;
+    // SAFETY: the buffer is being recorded, outside a pass; the image is new and may be copied to.
+    unsafe {
+        device.cmd_pipeline_barrier(buffer, copy, copy, flags, &[], &[], &[before]);
+        device.cmd_clear_color_image(buffer, image.handle, written.0, &nothing, &[all]);
+        device.cmd_pipeline_barrier(buffer, copy, read, flags, &[], &[], &[after]);
+    }
+}
+
+/// Fills all levels of one layer from a place in a buffer that has them one after the other, four
+/// bytes a texel, after earlier draws and before later ones.
+pub(crate) fn fill_layer(
+    device: &Device,
+    buffer: vk::CommandBuffer,
+    (from, mut at): (&Buffer, u64),
+    (image, layer): (&Image, u32),
+) {
+    let range =
+        vk::ImageSubresourceRange { base_array_layer: layer, layer_count: 1, ..image.all() };
+    let written = (vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::AccessFlags::TRANSFER_WRITE);
+    let before = image_turn(image.handle, range, (SHADER_READ, written));
+    let after = image_turn(image.handle, range, (written, SHADER_READ));
+    let (copy, read) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::FRAGMENT_SHADER);
+    let flags = vk::DependencyFlags::empty();
+    let device = &device.handle;
+    // SAFETY: the buffer is being recorded, outside a pass; the layer is one of the image's, which
+    // is in the layout for reading; the host wrote all levels into `from` before the submit.
+    unsafe {
+        device.cmd_pipeline_barrier(buffer, read, copy, flags, &[], &[], &[before]);
+        for level in 0..image.levels {
+            let [width, height] = image.size_px.map(|n| (n >> level).max(1));
+            let layers = vk::ImageSubresourceLayers::default()
+                .aspect_mask(vk::ImageAspectFlags::COLOR)
+                .mip_level(level)
+                .base_array_layer(layer)
+                .layer_count(1);
+            let region = vk::BufferImageCopy::default()
+                .buffer_offset(at)
+                .image_subresource(layers)
+                .image_extent(vk::Extent3D { width, height, depth: 1 });
+            device.cmd_copy_buffer_to_image(
+                buffer,
+                from.handle,
+                image.handle,
+                written.0,
+                &[region],
+            );
+            at += 4 * u64::from(width) * u64::from(height);
+        }
+        device.cmd_pipeline_barrier(buffer, copy, read, flags, &[], &[], &[after]);
+    }
+}

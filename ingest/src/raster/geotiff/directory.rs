@@ -32,6 +32,15 @@ const TILE_LENGTH: u16 = 323;
 const TILE_OFFSETS: u16 = 324;
 const TILE_BYTE_COUNTS: u16 = 325;
 
+/// What a file is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Bands {
+    /// One band of heights.
+    Heights,
+    /// Grey or red, green and blue, with alpha or without.
+    Colours,
+}
+
 /// Byte order and widths of a TIFF's numbers.
 struct Layout {
     big_endian: bool,
@@ -51,6 +60,7 @@ pub(super) fn check(
     name: &Path,
     file: &mut (impl Read + Seek),
     file_bytes: u64,
+    bands: Bands,
 ) -> Result<(), RasterError> {
     let io = |error| RasterError::io(name, error);
     let mut start = [0; 16];
@@ -77,7 +87,7 @@ pub(super) fn check(
         entry_fits(name, &entry, file_bytes)?;
         edges.note(&layout, &entry);
     }
-    edges.check(name)
+    edges.check(name, bands)
 }
 
 fn layout_of(name: &Path, start: &[u8]) -> Result<Layout, RasterError> {
@@ -141,15 +151,22 @@ impl Edges {
         }
     }
 
-    fn check(&self, name: &Path) -> Result<(), RasterError> {
+    fn check(&self, name: &Path, bands: Bands) -> Result<(), RasterError> {
         let [width, height, tile_width, tile_height] = self.of;
         if self.of.iter().any(|&edge| edge > EDGE_MAX) {
             let found = format!("{width} × {height} in tiles of {tile_width} × {tile_height}");
             return Err(RasterError::broken(name, format!("its size is {found}")));
         }
-        if self.bands > 1 {
+        let (most, advice) = match bands {
+            Bands::Heights => {
+                (1, "one band of heights is read: gdal_translate -b 1 in.tif out.tif")
+            }
+            Bands::Colours => {
+                (4, "1 to 4 bands are read: gdal_translate -b 1 -b 2 -b 3 in.tif out.tif")
+            }
+        };
+        if self.bands > most {
             let found = format!("{} bands", self.bands);
-            let advice = "one band of heights is read: gdal_translate -b 1 in.tif out.tif";
             return Err(RasterError::unsupported(name, found, advice));
         }
         let tiles = |edge: u64, tile: u64| if tile == 0 { 1 } else { edge.div_ceil(tile) };

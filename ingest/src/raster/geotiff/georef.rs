@@ -23,7 +23,7 @@ const LATITUDE_SLACK: f64 = 1.0;
 
 /// The georeferencing tags of one image, as numbers. Empty where a tag is missing.
 #[derive(Debug, Default)]
-pub(super) struct GeoTags {
+pub(crate) struct GeoTags {
     /// Tag 33550.
     pub pixel_scale: Vec<f64>,
     /// Tag 33922.
@@ -41,7 +41,7 @@ struct Affine {
 }
 
 /// The grid of an image, and whether its rows run north in the file.
-pub(super) fn grid(
+pub(crate) fn grid(
     name: &Path,
     size: [u32; 2],
     tags: &GeoTags,
@@ -173,6 +173,14 @@ fn plausible(name: &Path, grid: &Grid) -> Result<(), RasterError> {
 }
 
 impl GeoTags {
+    /// Whether the file says anything of where it lies.
+    pub fn is_empty(&self) -> bool {
+        self.pixel_scale.is_empty()
+            && self.tie_points.is_empty()
+            && self.transformation.is_empty()
+            && self.keys.is_empty()
+    }
+
     /// The value of a short key. Keys whose values lie in other tags are no numbers we need.
     fn key(&self, wanted: u16) -> Option<u16> {
         let entries = self.keys.get(4..)?.chunks_exact(4);

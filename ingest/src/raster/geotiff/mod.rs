@@ -7,8 +7,10 @@
 //! Not here: where the raster lies (`georef`), hostile headers (`directory`).
 
 mod directory;
-mod georef;
+pub(crate) mod georef;
 mod padded;
+
+pub(crate) use directory::Bands;
 
 use super::samples::{Samples, Transfer};
 use super::{ChunkGrid, Found, OpenOptions, Raster, RasterError, Source};
@@ -25,7 +27,7 @@ use tiff::tags::{CompressionMethod, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffResult};
 
 /// Most bytes that one strip or tile may decode to.
-const CHUNK_BYTES_MAX: u64 = 128 << 20;
+pub(crate) const CHUNK_BYTES_MAX: u64 = 128 << 20;
 
 /// Decoders of one file at the same time. (Large chunks are decoded one at a time anyway.)
 const LANES: usize = 4;
@@ -34,7 +36,7 @@ const LANES: usize = 4;
 const LANE_CHUNKS_MAX: usize = 1 << 17;
 
 /// No compression that is read packs more than this many bytes into one (LZW, by its codes).
-const EXPANSION_MAX: u64 = 4096;
+pub(crate) const EXPANSION_MAX: u64 = 4096;
 
 /// GDAL's void number, as text.
 const GDAL_NODATA: Tag = Tag::Unknown(42113);
@@ -44,13 +46,13 @@ const GDAL_METADATA: Tag = Tag::Unknown(42112);
 
 /// How chunks are packed, as far as it matters here.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Packing {
+pub(crate) enum Packing {
     Plain,
     Lzw,
     Other,
 }
 
-type FileDecoder = Decoder<BufReader<File>>;
+pub(crate) type FileDecoder = Decoder<BufReader<File>>;
 
 /// The chunks of one TIFF file.
 pub(crate) struct TiffSource {
@@ -70,8 +72,8 @@ impl std::fmt::Debug for TiffSource {
 }
 
 /// Opens a GeoTIFF's first image.
-pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<Found, RasterError> {
-    let (mut decoder, file_bytes) = open_decoder(path)?;
+pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Found, RasterError> {
+    let (mut decoder, file_bytes) = open_decoder(path, Bands::Heights)?;
     let wrong = |error| from_tiff(path, error);
     let (columns, rows) = decoder.dimensions().map_err(wrong)?;
     let number = number_kind(path, &mut decoder)?;
@@ -143,7 +145,7 @@ impl TiffSource {
                 of.store.drop_decoders(1);
                 decoder
             }
-            None => open_decoder(&of.name)?.0,
+            None => open_decoder(&of.name, Bands::Heights)?.0,
         };
         let read = if of.chunks.padded && (chunk + 1).is_multiple_of(of.chunks.across(&of.grid)) {
             self.decode_padded(of, &mut decoder, self.chunks[number as usize])
@@ -180,12 +182,13 @@ impl TiffSource {
     }
 }
 
-fn open_decoder(path: &Path) -> Result<(FileDecoder, u64), RasterError> {
+/// A decoder of a file that is no trap, and the file's size.
+pub(crate) fn open_decoder(path: &Path, bands: Bands) -> Result<(FileDecoder, u64), RasterError> {
     let io = |error| RasterError::io(path, error);
     let file = File::open(path).map_err(io)?;
     let bytes = file.metadata().map_err(io)?.len();
     let mut reader = BufReader::new(file);
-    directory::check(path, &mut reader, bytes)?;
+    directory::check(path, &mut reader, bytes, bands)?;
     reader.rewind().map_err(io)?;
     let decoder = Decoder::new(reader).map_err(|error| from_tiff(path, error))?;
     let mut limits = Limits::default();
@@ -193,7 +196,7 @@ fn open_decoder(path: &Path) -> Result<(FileDecoder, u64), RasterError> {
     Ok((decoder.with_limits(limits), bytes))
 }
 
-fn from_tiff(path: &Path, error: TiffError) -> RasterError {
+pub(crate) fn from_tiff(path: &Path, error: TiffError) -> RasterError {
     match error {
         TiffError::IoError(error) => RasterError::io(path, error),
         TiffError::UnsupportedError(error) => {
@@ -248,7 +251,7 @@ fn number_kind(path: &Path, decoder: &mut FileDecoder) -> Result<NumberKind, Ras
     Ok(NumberKind { kind, bytes: u32::from(bits) / 8, coding })
 }
 
-fn packing(path: &Path, decoder: &mut FileDecoder) -> Result<Packing, RasterError> {
+pub(crate) fn packing(path: &Path, decoder: &mut FileDecoder) -> Result<Packing, RasterError> {
     let wrong = |error| from_tiff(path, error);
     let code = decoder.find_tag_unsigned::<u16>(Tag::Compression).map_err(wrong)?.unwrap_or(1);
     match CompressionMethod::from_u16_exhaustive(code) {
@@ -290,7 +293,10 @@ fn chunk_grid(
 }
 
 /// Where the chunks are; the decoder has checked that there are as many as the size asks for.
-fn chunk_places(path: &Path, decoder: &mut FileDecoder) -> Result<Vec<(u64, u64)>, RasterError> {
+pub(crate) fn chunk_places(
+    path: &Path,
+    decoder: &mut FileDecoder,
+) -> Result<Vec<(u64, u64)>, RasterError> {
     let [offsets, counts] = match decoder.get_chunk_type() {
         ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
         ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
@@ -301,7 +307,7 @@ fn chunk_places(path: &Path, decoder: &mut FileDecoder) -> Result<Vec<(u64, u64)
     Ok(offsets.into_iter().zip(counts).collect())
 }
 
-fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, RasterError> {
+pub(crate) fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, RasterError> {
     let mut doubles = |tag| match decoder
         .find_tag(tag)
         .and_then(|value| value.map_or(Ok(Vec::new()), Value::into_f64_vec))
@@ -326,7 +332,7 @@ fn text(path: &Path, decoder: &mut FileDecoder, tag: Tag) -> Result<String, Rast
 }
 
 /// GDAL writes the void as decimal text.
-fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, RasterError> {
+pub(crate) fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, RasterError> {
     let text = text(path, decoder, GDAL_NODATA)?;
     let text = text.trim();
     if text.is_empty() {
