@@ -42,10 +42,13 @@ pub struct Sources {
     /// The topmost first.
     imagery: Vec<Imagery>,
     tiles: Mutex<Tiles>,
-    colours: Mutex<LruCache<(usize, PageKey), Option<Arc<ColourTile>>>>,
+    colours: Mutex<Colours>,
     body: Ellipsoid,
     sea: bool,
 }
+
+/// Tiles of imagery, and that there is none, by archive and key: the ones used last.
+type Colours = LruCache<(usize, PageKey), Option<Arc<ColourTile>>>;
 
 /// Decoded tiles, and that there is none: the ones used last.
 struct Tiles {

@@ -46,19 +46,19 @@ impl Terrain {
     /// Fills one [`PatchInfo`] a patch slot, up to
     /// [`Patches::used_end`](crate::mesh::Patches::used_end); the default where a slot is free.
     ///
+    /// As the views of the last frame that was not held see it.
     /// Judges every leaf anew: a frame's work many times over, for debug views.
     pub fn inspect(&self, infos: &mut Vec<PatchInfo>) {
         let (lod, pages, patches) = (self.lod(), self.pages(), self.patches());
-        let eyes = self.eyes();
-        let (diamonds, cover) = (&lod.mesh.diamonds, &lod.cover);
+        let (diamonds, cover, sights) = (&lod.mesh.diamonds, &lod.cover, &lod.sights);
         infos.clear();
         infos.resize(patches.used_end() as usize, PatchInfo::default());
         for id in diamonds.ids().filter(|&id| !diamonds[id].is_split()) {
             let region = &cover.region[id];
             let info = PatchInfo {
-                error_px: narrow(priority_px(region, &eyes.sights)),
+                error_px: narrow(priority_px(region, sights)),
                 level: diamonds[id].level(),
-                seen: u8::from(eyes.sights.iter().any(|sight| sight.sees(region))),
+                seen: u8::from(sights.iter().any(|sight| sight.sees(region))),
                 ..PatchInfo::default()
             };
             let sides = cover.patches[id].into_iter().zip(cover.pages[id]);

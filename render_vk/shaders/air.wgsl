@@ -5,8 +5,8 @@ const SUN_LIGHT: vec3<f32> = vec3<f32>(20.0, 19.4, 18.4); // irradiance before t
 const SUN_COS: f32 = 0.99998919;                          // cosine of the disc's radius, 0.2665°
 const SUN_DISC: f32 = 60.0;                               // radiance of the disc over SUN_LIGHT
 const SKY_LIGHT: vec3<f32> = vec3<f32>(0.040, 0.058, 0.088); // sky on flat ground, per SUN_LIGHT
-const NIGHT_LIGHT: vec3<f32> = vec3<f32>(0.012, 0.016, 0.026); // never quite dark
-const MOON_LIGHT: vec3<f32> = vec3<f32>(0.55, 0.66, 0.88);   // irradiance of a moon, far too bright
+const NIGHT_LIGHT: vec3<f32> = vec3<f32>(0.050, 0.065, 0.105); // never quite dark
+const MOON_LIGHT: vec3<f32> = vec3<f32>(2.6, 3.1, 4.2);      // irradiance of a moon, far too bright
 const EXPOSURE: f32 = 0.37;
 
 // ---- Air: one exponential profile of molecules and haze together ----

@@ -92,7 +92,7 @@ fn place_patch(
         }
         let morphs = morphs.get(at * LANES..).unwrap_or_default();
         for (lane, morph) in morphs.iter().enumerate().take(vertices.len()) {
-            let left = f64::from(left_of(morph, moment));
+            let left = f64::from(morph.left(moment.now_ms, moment.morph_ms));
             for (offsets, from_m) in offsets.iter_mut().zip(morph.from_m) {
                 offsets[lane] += left * f64::from(from_m);
             }
@@ -109,15 +109,6 @@ fn place_patch(
             *out = [0, 1, 2].map(|axis: usize| narrow(turned[axis][lane]));
         }
     }
-}
-
-/// What is left of a vertex's way: 1 when it is born, 0 once it has arrived.
-fn left_of(morph: &PatchMorph, moment: Moment) -> f32 {
-    let age_ms = moment.now_ms.wrapping_sub(morph.born_ms);
-    if age_ms >= moment.morph_ms {
-        return 0.0;
-    }
-    1.0 - narrow(f64::from(age_ms)) / narrow(f64::from(moment.morph_ms))
 }
 
 #[cfg(test)]

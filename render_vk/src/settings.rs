@@ -9,6 +9,7 @@ use crate::RANGES_MAX;
 use crate::error::StartError;
 use ash::vk;
 use overfly_core::limits::Limits;
+use overfly_core::mesh::morph::duration_ms;
 use overfly_core::mesh::topology;
 use overfly_core::settings::{DepthFormat, DepthOrder, SceneSettings, VertexPrecision};
 
@@ -66,14 +67,12 @@ impl RendererSettings {
 
     /// Whether vertices move.
     pub(crate) fn morphs(&self) -> bool {
-        self.morph_s > 0.0
+        self.morph_ms() > 0
     }
 
     /// The same in whole milliseconds, as the frame's time is counted.
     pub(crate) fn morph_ms(&self) -> u32 {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let ms = (self.morph_s * 1e3).ceil() as u32;
-        ms
+        duration_ms(self.morph_s)
     }
 
     /// Vertices of one patch.

@@ -217,9 +217,20 @@ struct Shared {
 
 #[test]
 fn recording_alone_or_on_two_workers_gives_the_same_bits() {
-    let Some(mut renderer) = renderer(false) else { return };
+    for vertices in [VertexPrecision::TwoFloat, VertexPrecision::EyeF64] {
+        for borders_m in [&[1.0][..], &[1.0, 2e5, 6e5]] {
+            if renderer(false).is_none() {
+                return;
+            }
+            let settings = RendererSettings { vertices, ..settings(false) };
+            two_workers_agree_with_one(Renderer::new(&settings).unwrap(), borders_m);
+        }
+    }
+}
+
+fn two_workers_agree_with_one(mut renderer: Renderer, borders_m: &[f64]) {
     let patches = planet::patches(4, 4000.0);
-    let view = planet::draws(low_camera(), &patches, &[1.0, 2e5, 6e5]);
+    let view = planet::draws(low_camera(), &patches, borders_m);
     let alone = picture(&mut renderer, (&view, &patches), &earth(), &Team::alone());
     let shared = Mutex::new(Shared { renderer, view, patches, shown: Vec::new() });
     let workers = Workers::new(2).unwrap();

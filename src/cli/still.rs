@@ -180,6 +180,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         shot.overfly.close();
         return Ok(ExitCode::from(INTERRUPTED));
     }
+    let bound_px = shot.output.counts.error_px_bound;
     shot.take(arguments, &scene, &view)?;
     let Shot { overfly, output, .. } = &mut shot;
     let pixels = overfly.with_renderer(Renderer::read_pixels).expect("it was set above")?;
@@ -191,7 +192,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         counts.triangles,
         counts.drawn,
         counts.pages,
-        counts.error_px_bound,
+        bound_px,
     );
     let messages = overfly.with_renderer(|renderer| renderer.validation_messages());
     let messages = messages.unwrap_or_default();

@@ -239,21 +239,21 @@ mod tests {
 
     #[test]
     fn any_height_from_a_metre_to_a_hundred_thousand_kilometres_is_flown_sanely() {
-        for height_m in [1.0, 100.0, 4e5, 1e8] {
-            for lat_deg in [0.0, 45.0, 90.0, -90.0] {
-                let mut eye = eye(lat_deg, 179.9, height_m, [77.0, 5.0]);
-                for step in 0..300_u32 {
-                    let motion = Motion { ahead: 1.0, right: 1.0, up: f64::from(step % 3) - 1.0 };
-                    let speed = speed_m_s(eye.place().height_m, 64.0);
-                    eye.turn(0.1, 0.01);
-                    eye.fly(motion, speed / 30.0, &BODY);
-                    eye.keep_above(0.0);
-                    assert_eq!(eye.view(&lens(), [640, 360], &BODY).check(), Ok(()));
-                }
-                assert!((eye.up.length() - 1.0).abs() < 1e-15);
-                assert!(eye.up.dot(eye.ahead).abs() < 1e-15);
-                assert!((ABOVE_GROUND_M..=HEIGHT_MAX_M).contains(&eye.place().height_m));
+        let heights_m = [1.0, 100.0, 4e5, 1e8];
+        let from = |height_m: f64| [0.0, 45.0, 90.0, -90.0].map(|lat_deg| (lat_deg, height_m));
+        for (lat_deg, height_m) in heights_m.into_iter().flat_map(from) {
+            let mut eye = eye(lat_deg, 179.9, height_m, [77.0, 5.0]);
+            for step in 0..300_u32 {
+                let motion = Motion { ahead: 1.0, right: 1.0, up: f64::from(step % 3) - 1.0 };
+                let speed = speed_m_s(eye.place().height_m, 64.0);
+                eye.turn(0.1, 0.01);
+                eye.fly(motion, speed / 30.0, &BODY);
+                eye.keep_above(0.0);
+                assert_eq!(eye.view(&lens(), [640, 360], &BODY).check(), Ok(()));
             }
+            assert!((eye.up.length() - 1.0).abs() < 1e-15);
+            assert!(eye.up.dot(eye.ahead).abs() < 1e-15);
+            assert!((ABOVE_GROUND_M..=HEIGHT_MAX_M).contains(&eye.place().height_m));
         }
     }
 

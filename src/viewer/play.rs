@@ -106,7 +106,6 @@ impl Transport {
 fn frames_in(time_s: f64, rate_hz: f64) -> usize {
     let frames = (time_s * rate_hz).floor().clamp(0.0, f64::from(u32::MAX));
     #[expect(clippy::cast_possible_truncation, reason = "a whole number that u32 holds")]
-    #[expect(clippy::cast_sign_loss, reason = "it is at least 0")]
     let frames = frames as u32;
     usize::try_from(frames).unwrap_or(usize::MAX)
 }

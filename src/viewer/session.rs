@@ -337,7 +337,7 @@ impl Session {
         let limits = self.overfly.terrain().limits();
         let settings = RendererSettings {
             validation: self.plan.validate,
-            ..RendererSettings::of(&self.plan.scene, &limits, size_px)
+            ..RendererSettings::of(&self.plan.scene, limits, size_px)
         };
         self.overfly.set_renderer(Renderer::for_window(&settings, window)?);
         Ok(())

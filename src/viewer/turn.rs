@@ -143,7 +143,8 @@ impl Session {
         }
         let help = if switches.help { keys::help() } else { Vec::new() };
         let panels = Panels {
-            lines: if switches.hud { &self.lines[..] } else { &[] },
+            // Both together are not readable in a small window.
+            lines: if switches.hud && !switches.help { &self.lines[..] } else { &[] },
             help: &help,
             notice: self.notice.as_ref().map(|(text, _)| text.as_str()),
             times: switches.graph.then_some(&self.times),

@@ -98,7 +98,7 @@ fn a_window_flies_records_resizes_and_closes_and_the_recording_replays() {
     }
     script += "key 1; key F1; key P; ";
     for turn in 0..25 {
-        let (a, b) = (160 + 8 * turn, 120 + 4 * turn);
+        let (a, b) = (96 + 4 * turn, 80 + 3 * turn);
         write!(script, "resize {a}x{b}; resize {b}x{a}; ").unwrap();
     }
     script += "key S 2; key F; key [; frames 2; quit";

@@ -29,7 +29,8 @@ pub struct FrameInput {
 pub struct FrameOutput {
     /// Frames run before this one.
     pub frame: u64,
-    /// The input's time in whole milliseconds, modulo 2^32: what morphing vertices count from.
+    /// What morphing vertices count from: the input's time in whole milliseconds, modulo 2^32. It
+    /// always runs on, so where the input stands or goes back it is ahead of that from then on.
     pub time_ms: u32,
     /// Counts of the work done.
     pub counts: FrameCounts,

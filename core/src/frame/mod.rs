@@ -50,34 +50,39 @@ pub struct Lod {
     /// Bounds, pages and patches of each diamond.
     pub cover: Cover,
     /// The sights of the last frame that was not held, from which motion is counted.
-    before: Vec<Sight>,
+    pub(crate) sights: Vec<Sight>,
     judges_all: bool,
 }
 
 /// What this frame's views see from.
 #[derive(Default)]
-pub(crate) struct Eyes {
+struct Eyes {
     cameras: Vec<Camera>,
     /// As the LOD judges them.
-    pub(crate) sights: Vec<Sight>,
+    sights: Vec<Sight>,
 }
 
-/// The frame's clock: the input's time, but that it never runs back. Where the input does, as in a
-/// seek, all morphs are over: so splits along a diamond's ancestors stay in the order of time.
+/// The frame's clock: the input's time, but that it always runs on. Where the input stands, as in
+/// a pause, or goes back, as in a seek, all morphs are over: so that a terrain which comes up in no
+/// time is where it belongs, and splits along a diamond's ancestors stay in the order of time.
 #[derive(Default)]
 struct Clock {
-    input_ms: Option<u32>,
+    input_s: Option<f64>,
     now_ms: u32,
 }
 
 impl Clock {
-    /// Goes on to an input's time, or by `morph_ms` where that lies behind or half the range on.
-    fn advance(&mut self, input_ms: u32, morph_ms: u32) -> u32 {
-        let step_ms = match self.input_ms.replace(input_ms) {
-            None => input_ms,
-            Some(before) => Some(input_ms.wrapping_sub(before))
-                .filter(|&step_ms| step_ms <= u32::MAX / 2)
-                .unwrap_or(morph_ms),
+    /// Goes on to an input's time, or by `morph_ms` where that stands, lies behind or half the
+    /// range on.
+    fn advance(&mut self, input_s: f64, morph_ms: u32) -> u32 {
+        let step_ms = match self.input_s.replace(input_s) {
+            None => milliseconds(input_s),
+            Some(before_s) if input_s > before_s => {
+                Some(milliseconds(input_s).wrapping_sub(milliseconds(before_s)))
+                    .filter(|&step_ms| step_ms <= u32::MAX / 2)
+                    .unwrap_or(morph_ms)
+            }
+            Some(_) => morph_ms,
         };
         self.now_ms = self.now_ms.wrapping_add(step_ms);
         self.now_ms
@@ -128,7 +133,7 @@ impl Terrain {
             lod: RwLock::new(Lod {
                 mesh: Mesh::new(limits.diamonds, knobs_of(settings, &limits)),
                 cover: Cover::new(limits.diamonds, morphs),
-                before: Vec::new(),
+                sights: Vec::new(),
                 judges_all: false,
             }),
             build_blocks: Mutex::new(BuildBlock::for_patches(
@@ -196,11 +201,6 @@ impl Terrain {
         &self.output
     }
 
-    /// The eyes of the last frame.
-    pub(crate) fn eyes(&self) -> RwLockReadGuard<'_, Eyes> {
-        self.eyes.read()
-    }
-
     /// Whether every frame judges every diamond, whatever the motion: the same mesh for more work,
     /// which is what tests and benchmarks compare with.
     pub fn judge_all(&self, always: bool) {
@@ -213,7 +213,7 @@ impl Terrain {
     /// What does not agree, in words.
     pub fn audit(&self) -> Result<(), String> {
         let (lod, pages, patches) = (self.lod.read(), self.pages.read(), self.patches.read());
-        let judge = |diamonds: &_, id, band| judge(&lod.cover, &lod.before, (diamonds, id), band);
+        let judge = |diamonds: &_, id, band| judge(&lod.cover, &lod.sights, (diamonds, id), band);
         lod.mesh.check(&judge)?;
         audit::consistent(&lod.mesh, &lod.cover, &pages, &patches)?;
         audit::closed(&lod.mesh.diamonds, &lod.cover, &patches)
@@ -254,7 +254,7 @@ fn admit(terrain: &Terrain) {
         (input.time_s, input.hold_lod)
     };
     let morph_ms = terrain.morphing.as_ref().map_or(0, |morphing| morphing.duration_ms);
-    output.time_ms = terrain.clock.lock().advance(milliseconds(time_s), morph_ms);
+    output.time_ms = terrain.clock.lock().advance(time_s, morph_ms);
     let frame = output.frame;
     let done = if held {
         refuse_all(&mut arrived, &mut output.evicted)
@@ -305,10 +305,10 @@ fn prioritise(terrain: &Terrain, team: &Team<'_>) {
     }
     let eyes = terrain.eyes.read();
     let mut lod = terrain.lod.write();
-    let Lod { mesh, cover, before, judges_all } = &mut *lod;
-    let motion = if *judges_all { None } else { motion_between(before, &eyes.sights) };
-    before.clear();
-    before.extend_from_slice(&eyes.sights);
+    let Lod { mesh, cover, sights, judges_all } = &mut *lod;
+    let motion = if *judges_all { None } else { motion_between(sights, &eyes.sights) };
+    sights.clear();
+    sights.extend_from_slice(&eyes.sights);
     let cover = &*cover;
     let judge = |diamonds: &_, id, band| judge(cover, &eyes.sights, (diamonds, id), band);
     let evaluations = mesh.prioritise(&judge, motion, &|placements, body| {

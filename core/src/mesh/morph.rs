@@ -30,6 +30,10 @@ use glam::{DVec3, IVec3};
 /// Longest morph: twelve days, far below the 2^32 ms after which times repeat.
 const LONGEST_MS: f64 = (1_u32 << 30) as f64;
 
+/// A vertex whose way is longer than this many of the edge that it halves does not go it: where a
+/// dozen levels come in as many frames, the surface that they refine is nowhere near the ground.
+const LEAP: f64 = 1.0;
+
 /// A morph of this many seconds in milliseconds; 0 if and only if the scene does not morph.
 pub fn duration_ms(morph_s: f64) -> u32 {
     if morph_s > 0.0 {
@@ -288,6 +292,9 @@ impl Origin<'_> {
         let page = self.ground.pages.get(step.page);
         let [a, b] = ends.map(|(point, way)| self.drawn((point, &way), page, step.born_ms));
         let from = (a.place + b.place) * 0.5 - place;
+        if from.length_squared() > LEAP * LEAP * (a.place - b.place).length_squared() {
+            return Way::resting(place);
+        }
         let sum = a.normal + b.normal;
         let layers = [0, 1, 2, 3].map(|i| level_of(f64::midpoint(a.layers[i], b.layers[i])));
         let morph = PatchMorph {

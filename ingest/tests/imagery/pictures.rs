@@ -12,6 +12,8 @@ use overfly_core::geodesy::trig::{atan2, cos, exp, sin};
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_ingest::raster::Projection;
 use overfly_ingest::{ImageryOptions, ImageryReport, IngestError, build_imagery};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -164,6 +166,8 @@ pub fn build(options: &ImageryOptions) -> Result<ImageryReport, IngestError> {
 pub struct Atlas {
     pub archive: Imagery,
     pub report: ImageryReport,
+    /// Tiles that places were looked up in.
+    known: RefCell<BTreeMap<PageKey, Option<ColourTile>>>,
 }
 
 impl Atlas {
@@ -172,7 +176,7 @@ impl Atlas {
         let report = build(options).unwrap();
         let location = Location::File(options.output.clone());
         let archive = Imagery::open_imagery(&location, &OpenOptions::default()).unwrap();
-        Self { archive, report }
+        Self { archive, report, known: RefCell::default() }
     }
 
     /// A tile, if there is one.
@@ -197,7 +201,8 @@ impl Atlas {
         let cell = |at: f64| (at as u32).min((1 << (depth + COLOUR_BITS)) - 1);
         let (i, j) = (cell(u), cell(v));
         let key = PageKey::new(quadrant, depth, i >> COLOUR_BITS, j >> COLOUR_BITS);
-        let tile = self.tile(key)?;
+        let mut known = self.known.borrow_mut();
+        let tile = known.entry(key).or_insert_with(|| self.tile(key)).as_ref()?;
         let side = (COLOUR_SIDE - 1) as u32;
         let (a, b) = (u - f64::from(i), v - f64::from(j));
         let texel = |di: u32, dj: u32| {
