@@ -76,7 +76,8 @@ fn plane(
     for (column, row) in (0..squares).flat_map(|c| (0..squares).map(move |r| (c, r))) {
         let [a, b] = [at(column, row), at(column + 1, row)];
         let [c, d] = [at(column + 1, row + 1), at(column, row + 1)];
-        let halves = if squares % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] };
+        let halves =
+            if squares.is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] };
         corners.extend(halves);
     }
 }
@@ -225,17 +226,18 @@ fn what_each_setting_resolves_is_printed_on_request() {
         return;
     }
     println!("from {NEAR_M} m on by tens: the smallest separation with every pixel right");
-    for (name, pair) in [("meshes", MESHES), ("planes", WHOLE)] {
-        for format in [DepthFormat::D32F, DepthFormat::D24] {
-            for order in [DepthOrder::Reversed, DepthOrder::Forward] {
-                let settings = with(format, order, VertexPrecision::EyeF64);
-                let Some(mut renderer) = stage::renderer(&settings) else { return };
-                let borders_m = auto(format, order);
-                let row: Vec<String> = distances(NEAR_M, 1e7, 1)
-                    .map(|d| format!("{:.0e}", resolved(&mut renderer, &borders_m, pair, d)))
-                    .collect();
-                println!("{name}, {format:?} {order:?}: {}", row.join(" "));
-            }
+    let formats = [DepthFormat::D32F, DepthFormat::D24].into_iter();
+    let settings =
+        formats.flat_map(|f| [DepthOrder::Reversed, DepthOrder::Forward].map(|order| (f, order)));
+    for (format, order) in settings {
+        let settings = with(format, order, VertexPrecision::EyeF64);
+        let Some(mut renderer) = stage::renderer(&settings) else { return };
+        let borders_m = auto(format, order);
+        for (name, pair) in [("meshes", MESHES), ("planes", WHOLE)] {
+            let row: Vec<String> = distances(NEAR_M, 1e7, 1)
+                .map(|d| format!("{:.0e}", resolved(&mut renderer, &borders_m, pair, d)))
+                .collect();
+            println!("{name}, {format:?} {order:?}: {}", row.join(" "));
         }
     }
 }

@@ -19,15 +19,18 @@ use overfly_core::inspect::PatchInfo;
 use overfly_core::mesh::Patches;
 use overfly_core::scene::FrameParts;
 use overfly_jobs::Team;
-use overfly_render_vk::{Picture, Renderer, RendererSettings, Show};
+use overfly_render_vk::{Backdrop, Picture, Renderer, RendererSettings, Show};
 use std::fs;
 use std::path::PathBuf;
 
 const SIZE_PX: [u32; 2] = [128, 72];
-const BORDERS_M: [f64; 3] = [1.0, 2e5, 6e5];
+const BORDERS_M: [f64; 3] = [1.0, 1.6e6, 2.4e6];
 
-/// Name, what is shown, from where. Shaded ones last: they change with every shader.
-const PICTURES: [(&str, Show, fn() -> Camera); 8] = [
+/// Name, what is shown, from where.
+type Golden = (&'static str, Show, fn() -> Camera);
+
+/// Shaded ones last: they change with every shader.
+const PICTURES: [Golden; 8] = [
     ("wireframe", Show::Wireframe, low_camera),
     ("level", Show::Level, low_camera),
     ("error", Show::ScreenError, low_camera),
@@ -43,7 +46,7 @@ fn far_camera() -> Camera {
 }
 
 fn low_camera() -> Camera {
-    let eye = DVec3::new(0.8, 0.5, 0.33).normalize() * 6.45e6;
+    let eye = DVec3::new(0.8, 0.5, 0.33).normalize() * 7.6e6;
     planet::camera(eye, DVec3::new(0.7, 0.5, 0.53).normalize() * 6.36e6, SIZE_PX, 60.0)
 }
 
@@ -66,7 +69,11 @@ fn draw(renderer: &mut Renderer, (show, camera): (Show, Camera), patches: &Patch
     let view = planet::draws(camera, patches, &BORDERS_M);
     let infos = infos(patches);
     let parts = FrameParts { sun_direction, sea: true };
-    let picture = Picture { show, infos: &infos, ..Picture::of(&view, patches, &parts) };
+    let shaded = show == Show::Shaded;
+    // A plain one behind debug views, so that they change with their own shader only.
+    let backdrop = if shaded { Backdrop::Sky } else { Backdrop::Colour([0.02, 0.03, 0.05]) };
+    let of = Picture::of(&view, patches, &parts);
+    let picture = Picture { show, infos: &infos, backdrop, ..of };
     renderer.draw(&picture, &Team::alone()).unwrap();
     renderer.read_pixels().unwrap()
 }
@@ -122,10 +129,10 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
 #[test]
 fn pictures_are_as_they_were() {
     let settings =
-        RendererSettings { patch_depth: planet::PATCH_DEPTH, ..stage::settings(SIZE_PX, 8 << 6) };
+        RendererSettings { patch_depth: planet::PATCH_DEPTH, ..stage::settings(SIZE_PX, 8 << 8) };
     let Some(mut renderer) = stage::renderer(&settings) else { return };
     let driver = renderer.device_line();
-    let patches = planet::patches(3, 4000.0);
+    let patches = planet::patches(4, 4000.0);
     let known = hashes();
     let mut faults = Vec::new();
     for (name, show, camera) in PICTURES {

@@ -80,7 +80,7 @@ fn picture(
     parts: &FrameParts,
     team: &Team<'_>,
 ) -> Vec<u8> {
-    renderer.draw(&Picture::of(&view, &patches, &parts), team).unwrap();
+    renderer.draw(&Picture::of(view, patches, parts), team).unwrap();
     renderer.read_pixels().unwrap()
 }
 
@@ -255,7 +255,7 @@ fn draws_that_do_not_fit_the_renderer_are_refused_and_it_stays_usable() {
     let good = planet::draws(far_camera(), &patches, &[1.0]);
     let other_size = planet::camera(DVec3::X * 1e7, DVec3::ZERO, [64, 64], 40.0);
     let mut refused = |view: &ViewDraws, patches: &Patches| {
-        renderer.draw(&Picture::of(&view, &patches, &AIRLESS), &team).unwrap_err().to_string()
+        renderer.draw(&Picture::of(view, patches, &AIRLESS), &team).unwrap_err().to_string()
     };
     let text = refused(&planet::draws(other_size, &patches, &[1.0]), &patches);
     assert_eq!(text, "the view is 64 x 64 pixels, the renderer's pictures are 480 x 320");

@@ -137,6 +137,7 @@ fn frame(
     let drawn = run.draws && reported && (still || run.stills.is_empty());
     let ready_ns = now_ns();
     if drawn {
+        follow_size(run, overfly, input)?;
         overfly.frame_drawn(input, output, 0)?;
     } else {
         overfly.frame(input, output)?;
@@ -163,6 +164,16 @@ fn frame(
     if reported {
         run.digest.add(&output.digest);
         run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
+    }
+    Ok(())
+}
+
+/// A recording of a window may change its size.
+fn follow_size(run: &mut Run, overfly: &mut Overfly, input: &FrameInput) -> Result<(), Failure> {
+    let Some(size_px) = input.views.first().map(|view| view.size_px) else { return Ok(()) };
+    if size_px != run.size_px {
+        overfly.with_renderer(|renderer| renderer.resize(size_px)).transpose()?;
+        run.size_px = size_px;
     }
     Ok(())
 }

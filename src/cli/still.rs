@@ -7,6 +7,7 @@
 
 use super::replay::{default_workers, parse_size};
 use super::{DIVERGED, Failure, INTERRUPTED, NO_DEVICE, place_of, stills};
+use crate::viewer::screenshot::Sidecar;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::core::camera::{View, orientation_from_attitude};
@@ -36,12 +37,21 @@ const LINES_MAX: usize = 6000;
 /// What `still` takes.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// A scene file or a preset (earth, moon, small).
-    #[arg(long, default_value = "earth")]
-    scene: String,
-    /// Where the eye is: degrees, and metres above sea level.
-    #[arg(long, value_name = "LAT,LON,ALT", allow_hyphen_values = true, value_parser = parse_at)]
-    at: At,
+    /// A scene file or a preset (earth, moon, small). [default: earth, or the sidecar's]
+    #[arg(long)]
+    scene: Option<String>,
+    /// Where the eye is: degrees, and metres above the ellipsoid.
+    #[arg(
+        long,
+        value_name = "LAT,LON,ALT",
+        allow_hyphen_values = true,
+        value_parser = parse_at,
+        required_unless_present = "sidecar"
+    )]
+    at: Option<At>,
+    /// Draws the picture of a screenshot's .ron again: its scene, eye, size, sun and view.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["at", "agl", "fov", "time"])]
+    sidecar: Option<PathBuf>,
     /// ALT is above the ground instead.
     #[arg(long)]
     agl: bool,
@@ -56,8 +66,9 @@ pub struct Arguments {
     )]
     look: Look,
     /// What to show: shaded, wireframe, level, error, residency, normals, range or culled.
-    #[arg(long, value_name = "NAME", default_value = "shaded", value_parser = parse_show)]
-    view: Show,
+    /// [default: shaded, or the sidecar's]
+    #[arg(long, value_name = "NAME", value_parser = parse_show)]
+    view: Option<Show>,
     /// Draws the bounds of patches near the eye.
     #[arg(long)]
     boxes: bool,
@@ -67,9 +78,9 @@ pub struct Arguments {
     /// Vertical field of view in degrees. [default: the scene's first view's]
     #[arg(long, value_name = "DEG", value_parser = parse_fov)]
     fov: Option<f64>,
-    /// Size of the picture in pixels.
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
-    size: [u32; 2],
+    /// Size of the picture in pixels. [default: 1280x720, or the sidecar's]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
     /// Seconds of the flight: where the sun of a running clock has come to.
     #[arg(long, value_name = "S", default_value = "0", value_parser = parse_time)]
     time: f64,
@@ -150,15 +161,28 @@ fn parse_time(text: &str) -> Result<f64, String> {
     number(("time", [0.0, 1e9]), text)
 }
 
+/// What is to be drawn.
+struct Subject {
+    scene: SceneSettings,
+    show: Show,
+    size_px: [u32; 2],
+    time_s: f64,
+    /// The view of a sidecar.
+    view: Option<View>,
+}
+
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let out = place_of(&arguments.out, &mut std::fs::canonicalize(&arguments.scene).into_iter().collect())?;
-    let scene = scene_of(arguments)?;
-    let mut overfly = Overfly::new(&scene, default_workers())?;
+    let inputs = [arguments.scene.as_ref().map(PathBuf::from), arguments.sidecar.clone()];
+    let inputs = inputs.into_iter().flatten();
+    let mut taken = inputs.filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    let out = place_of(&arguments.out, &mut taken)?;
+    let subject = subject_of(arguments)?;
+    let mut overfly = Overfly::new(&subject.scene, default_workers())?;
     let limits = overfly.terrain().limits();
     let settings = RendererSettings {
         validation: arguments.validate,
-        ..RendererSettings::of(&scene, limits, arguments.size)
+        ..RendererSettings::of(&subject.scene, limits, subject.size_px)
     };
     let renderer = match Renderer::new(&settings) {
         Ok(renderer) => renderer,
@@ -169,30 +193,32 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     };
     say!("drawing on {}", renderer.device_line());
     overfly.set_renderer(renderer);
-    let view = view_of(arguments, &scene, &overfly)?;
+    let view = match subject.view {
+        Some(view) => view,
+        None => view_of(arguments, &subject, &overfly)?,
+    };
     let mut shot = Shot {
         loader: overfly.loader(default_workers().max(1))?,
         input: FrameInput::default(),
         output: FrameOutput::default(),
         overfly,
     };
-    if !shot.settle(&view, arguments.time)? {
+    if !shot.settle(&view, subject.time_s)? {
         shot.overfly.close();
         return Ok(ExitCode::from(INTERRUPTED));
     }
     let bound_px = shot.output.counts.error_px_bound;
-    shot.take(arguments, &scene, &view)?;
+    shot.take(arguments, &subject, &view)?;
     let Shot { overfly, output, .. } = &mut shot;
     let pixels = overfly.with_renderer(Renderer::read_pixels).expect("it was set above")?;
-    stills::write_png(&out, arguments.size, pixels)?;
+    stills::write_png(&out, subject.size_px, pixels)?;
     let counts = &output.counts;
     say!(
-        "wrote {}: {} triangles, {} patches drawn, {} pages, error bound {:.2} px",
+        "wrote {}: {} triangles, {} patches drawn, {} pages, error bound {bound_px:.2} px",
         out.display(),
         counts.triangles,
         counts.drawn,
         counts.pages,
-        bound_px,
     );
     let messages = overfly.with_renderer(|renderer| renderer.validation_messages());
     let messages = messages.unwrap_or_default();
@@ -204,9 +230,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(DIVERGED) })
 }
 
-fn scene_of(arguments: &Arguments) -> Result<SceneSettings, Failure> {
-    let mut scene = config::load(&arguments.scene)?;
-    let lod = &mut scene.lod;
+fn subject_of(arguments: &Arguments) -> Result<Subject, Failure> {
+    let mut subject = if let Some(path) = &arguments.sidecar {
+        let sidecar = Sidecar::read(path)?;
+        let (_, _, scene) = sidecar.scene(arguments.scene.as_deref())?;
+        let show = parse_show(&sidecar.show)?;
+        let (size_px, time_s) = (sidecar.size_px, sidecar.time_s);
+        Subject { scene, show, size_px, time_s, view: Some(sidecar.view()) }
+    } else {
+        let scene = config::load(arguments.scene.as_deref().unwrap_or("earth"))?;
+        let (show, size_px) = (Show::Shaded, [1280, 720]);
+        Subject { scene, show, size_px, time_s: arguments.time, view: None }
+    };
+    let lod = &mut subject.scene.lod;
     if let Some(triangles) = arguments.triangles {
         let least = 8_u32 << lod.patch_depth;
         if !(least..=16_000_000).contains(&triangles) {
@@ -220,16 +256,18 @@ fn scene_of(arguments: &Arguments) -> Result<SceneSettings, Failure> {
         }
         lod.tolerance = Pixels(tolerance);
     }
-    Ok(scene)
+    subject.show = arguments.view.unwrap_or(subject.show);
+    subject.size_px = arguments.size.unwrap_or(subject.size_px);
+    if let Some(view) = &mut subject.view {
+        view.size_px = subject.size_px;
+    }
+    Ok(subject)
 }
 
 /// The view that was asked for, with an eye that is not below the ground.
-fn view_of(
-    arguments: &Arguments,
-    scene: &SceneSettings,
-    overfly: &Overfly,
-) -> Result<View, Failure> {
-    let At { lat_deg, lon_deg, alt_m } = arguments.at;
+fn view_of(arguments: &Arguments, subject: &Subject, overfly: &Overfly) -> Result<View, Failure> {
+    let scene = &subject.scene;
+    let At { lat_deg, lon_deg, alt_m } = arguments.at.expect("clap asks for it");
     let below = Geodetic::from_degrees(lat_deg, lon_deg, 0.0);
     let ground_m = overfly.ground_height_m(below)?;
     let surface_m = if scene.sea { ground_m.max(0.0) } else { ground_m };
@@ -249,7 +287,7 @@ fn view_of(
         eye: scene.body.ecef_from_geodetic(at),
         orientation: orientation_from_attitude(at, heading, pitch, roll),
         field_of_view: arguments.fov.map_or(lens.field_of_view, Radians::from_degrees),
-        size_px: arguments.size,
+        size_px: subject.size_px,
         near_m: lens.near_m,
     })
 }
@@ -303,19 +341,16 @@ impl Shot {
     fn take(
         &mut self,
         arguments: &Arguments,
-        scene: &SceneSettings,
+        subject: &Subject,
         view: &View,
     ) -> Result<(), Failure> {
-        let settled_s = arguments.time + scene.lod.morph_s.max(FADE_S) + 0.01;
-        let observer = if arguments.view == Show::Culled {
-            observer_of(view, scene)
-        } else {
-            *view
-        };
+        let settled_s = subject.time_s + subject.scene.lod.morph_s.max(FADE_S) + 0.01;
+        let observer =
+            if subject.show == Show::Culled { observer_of(view, &subject.scene) } else { *view };
         self.decorate(arguments, view, &observer);
         self.fill(&observer, settled_s);
         self.input.hold_lod = true;
-        self.overfly.looks_mut().show = arguments.view;
+        self.overfly.looks_mut().show = subject.show;
         self.overfly.frame_drawn(&mut self.input, &mut self.output, 0)?;
         Ok(())
     }

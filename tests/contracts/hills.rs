@@ -49,7 +49,7 @@ impl Hills {
         let text = format!(
             "Scene(body: Sphere(radius_m: 1000.0), sea: true, memory: (pages_mib: 64),\n\
              sources: [Archive({location:?}), Procedural(seed: 1)],\n\
-             depth: (splits_m: [10.0, 300.0]))\n"
+             depth: (ranges: [10.0, 300.0]))\n"
         );
         std::fs::write(self.scene(), text).unwrap();
     }

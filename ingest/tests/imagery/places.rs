@@ -125,7 +125,7 @@ fn grey_and_palette_and_alpha_are_read_and_facts_say_what_was_built() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let pixels = 64 * 32;
-    let cases: [(&str, ColorType, BitDepth, Vec<u8>, [u8; 4]); 5] = [
+    let cases: [(&str, ColorType, BitDepth, _, [u8; 4]); 5] = [
         ("grey", ColorType::Grayscale, BitDepth::Eight, vec![77; pixels], [77, 77, 77, 255]),
         ("bits", ColorType::Grayscale, BitDepth::One, vec![255; pixels / 8], [255; 4]),
         ("soft", ColorType::GrayscaleAlpha, BitDepth::Eight, vec![90; 2 * pixels], [90; 4]),
