@@ -39,6 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         depth_order: DepthOrder::Reversed,
         vertices: VertexPrecision::TwoFloat,
         morph_s: 0.0,
+        imagery: false,
         tolerance_px: 1.0,
         keep_depth: false,
         frames_in_flight: 2,

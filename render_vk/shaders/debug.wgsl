@@ -58,8 +58,12 @@ fn fragment(point: Point) -> @location(0) vec4<f32> {
     if view.show == WIREFRAME {
         let edge = 1.0 - smoothstep(EDGE_PX - 0.5, EDGE_PX + 0.5, near.x);
         let border = 1.0 - smoothstep(BORDER_PX - 0.5, BORDER_PX + 0.5, near.y);
-        colour = mix(colour * (0.2 + 0.8 * facing), vec3<f32>(0.55, 0.60, 0.62), edge);
-        return vec4<f32>(mix(colour, vec3<f32>(0.85, 0.45, 0.03), border), 1.0);
+        // Where triangles are too small for edges of their own, they are left out, patches later.
+        let step_px = 1.0 / max(fwidth(point.at.x), fwidth(point.at.y));
+        let drawn = edge * smoothstep(2.0, 6.0, step_px);
+        let bold = border * smoothstep(0.8, 3.0, step_px);
+        colour = mix(colour * (0.2 + 0.8 * facing), vec3<f32>(0.55, 0.60, 0.62), drawn);
+        return vec4<f32>(mix(colour, vec3<f32>(0.85, 0.45, 0.03), bold), 1.0);
     }
     if view.show == NORMALS {
         let east = normalize(cross(vec3<f32>(0.0, 0.0, 1.0), up) + vec3<f32>(1e-6, 0.0, 0.0));

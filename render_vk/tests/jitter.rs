@@ -201,7 +201,8 @@ fn a_point_at_1_m_is_drawn_within_a_hundredth_of_a_pixel_anywhere_in_both_precis
             let computed = computed_rms_px(place(name), vertices, (wide, 0.9));
             let [drawn, largest] = drawn_px(&mut renderer, place(name), wide, 1000.0);
             println!(
-                "{vertices:?}, {}: computed {computed:.1e}, drawn {drawn:.1e}, at most {largest:.1e} px",
+                "{vertices:?}, {}: computed {computed:.1e}, drawn {drawn:.1e}, at most \
+                 {largest:.1e} px",
                 name.0
             );
             assert!(computed <= 0.01 && drawn <= 0.01 && largest <= 0.01, "{name:?}");

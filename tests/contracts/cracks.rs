@@ -83,12 +83,10 @@ impl Shot {
             (0..sky.len()).filter(|&at| is_border(at) && self.magenta[at]).collect();
         next.iter().for_each(|&at| sky[at] = true);
         while let Some(at) = next.pop() {
-            for beside in around(at, 1).filter(|&beside| self.magenta[beside]) {
-                if !sky[beside] {
-                    sky[beside] = true;
-                    next.push(beside);
-                }
-            }
+            let new = |beside: &usize| self.magenta[*beside] && !sky[*beside];
+            let found = next.len();
+            next.extend(around(at, 1).filter(new));
+            next[found..].iter().for_each(|&beside| sky[beside] = true);
         }
         let at_sky = |at: usize| around(at, HORIZON_PX).any(|beside| sky[beside]);
         (0..sky.len()).filter(|&at| self.magenta[at] && !at_sky(at)).collect()
