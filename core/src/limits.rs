@@ -6,6 +6,7 @@
 //! Not here: the settings' own ranges (`overfly_config` checks those).
 
 use crate::datasource::Page;
+use crate::datasource::colour::{COLOUR_TEXELS, ColourTile};
 use crate::datasource::page::Survey;
 use crate::settings::SceneSettings;
 
@@ -40,7 +41,9 @@ impl Limits {
         let splits = ((lod.triangles_max >> lod.patch_depth) - BASE_LEAVES) / 2;
         let leaves = BASE_LEAVES + 2 * splits;
         let survey = if settings.archives().next().is_some() { size_of::<Survey>() } else { 0 };
-        let pages = settings.memory.pages_bytes / (size_of::<Page>() + survey) as u64;
+        let texels = size_of::<ColourTile>() + COLOUR_TEXELS * size_of::<[u8; 4]>();
+        let colour = if settings.imagery.is_empty() { 0 } else { texels };
+        let pages = settings.memory.pages_bytes / (size_of::<Page>() + survey + colour) as u64;
         let built = 8_u64 * u64::from(lod.splits_max) + 2 * u64::from(lod.merges_max) + 8;
         Self {
             leaves,

@@ -6,7 +6,7 @@ const NO_LAYER: u32 = 0xffffffffu;
 const TEXELS: f32 = 129.0;        // along a tile; the outer ones lie on its border
 const FADE_MS: f32 = 250.0;       // how long a tile takes to cover the one before
 
-// Straight colour and opacity of a tile.
+// Colour times opacity, and opacity, of a tile.
 fn tile_at(layer: u32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> vec4<f32> {
     if layer == NO_LAYER { return vec4<f32>(0.0); }
     let scale = (TEXELS - 1.0) / TEXELS;
@@ -26,5 +26,5 @@ fn draped(point: Point, albedo: vec3<f32>, grain: Grain) -> vec3<f32> {
         shown = mix(before, tile, age_ms / FADE_MS);
     }
     let mottled = 1.0 + 0.10 * grain.broad.x + 0.16 * grain.fine.x;
-    return mix(albedo, shown.rgb * mottled, shown.a);
+    return albedo * (1.0 - shown.a) + shown.rgb * mottled;
 }

@@ -127,9 +127,12 @@ impl Imagery {
     }
 }
 
-/// A tile and its smaller levels, one after the other: each texel is the mean light of four.
+/// A tile and its smaller levels, one after the other, multiplied by their opacity so that they can
+/// be filtered: each texel is the mean light of four.
 fn levels_of(tile: &[Texel], out: &mut [Texel]) {
-    out[..tile.len()].copy_from_slice(tile);
+    for (to, &texel) in out.iter_mut().zip(tile) {
+        *to = multiplied(texel);
+    }
     let (mut from, mut side) = (0, COLOUR_SIDE);
     for _ in 1..LEVELS {
         let half = side / 2;
@@ -143,16 +146,24 @@ fn levels_of(tile: &[Texel], out: &mut [Texel]) {
     }
 }
 
-fn mean(four: [Texel; 4]) -> Texel {
-    let opacity: u32 = four.iter().map(|texel| u32::from(texel[3])).sum();
-    if opacity == 0 {
-        return [0; 4];
+/// A colour in light, times its opacity.
+fn multiplied([r, g, b, alpha]: Texel) -> Texel {
+    if alpha == u8::MAX {
+        return [r, g, b, alpha];
     }
-    let colour = |i: usize| {
-        let light: u32 =
-            four.iter().map(|texel| u32::from(light_of(texel[i])) * u32::from(texel[3])).sum();
-        byte_of(u16::try_from(light / opacity).expect("a mean of 16 bits"))
+    let part = |byte| {
+        let light = u32::from(light_of(byte)) * u32::from(alpha) / 255;
+        byte_of(u16::try_from(light).expect("less than before"))
     };
+    [part(r), part(g), part(b), alpha]
+}
+
+fn mean(four: [Texel; 4]) -> Texel {
+    let colour = |i: usize| {
+        let light: u32 = four.iter().map(|texel| u32::from(light_of(texel[i]))).sum();
+        byte_of(u16::try_from(light / 4).expect("a mean of 16 bits"))
+    };
+    let opacity: u32 = four.iter().map(|texel| u32::from(texel[3])).sum();
     let alpha = u8::try_from((opacity + 2) / 4).expect("a mean of bytes");
     [colour(0), colour(1), colour(2), alpha]
 }
@@ -162,20 +173,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smaller_levels_of_one_colour_are_that_colour_and_holes_do_not_darken() {
+    fn smaller_levels_of_one_colour_are_that_colour_and_holes_add_nothing() {
         let mut tile = vec![[200, 100, 50, 255]; COLOUR_SIDE * COLOUR_SIDE];
         tile[0] = [0; 4];
         let mut out = vec![[9; 4]; TEXELS];
         levels_of(&tile, &mut out);
         let second = &out[COLOUR_SIDE * COLOUR_SIDE..];
-        assert_eq!(second[0], [200, 100, 50, 191]);
+        assert_eq!(second[0], multiplied([200, 100, 50, 191]));
         assert_eq!(second[1], [200, 100, 50, 255]);
-        assert_eq!(out[TEXELS - 1][..3], [200, 100, 50]);
+        assert!(out[TEXELS - 1][3] >= 254);
     }
 
     #[test]
     fn black_and_white_mix_in_light() {
         let [black, white] = [[0, 0, 0, 255], [255; 4]];
         assert_eq!(mean([black, white, black, white]), [188, 188, 188, 255]);
+        assert_eq!(multiplied([255, 255, 255, 128]), [188, 188, 188, 128]);
     }
 }

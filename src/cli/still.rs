@@ -326,7 +326,7 @@ impl Shot {
         }
         bar.finish_and_clear();
         for (key, error) in self.loader.faults() {
-            eprintln!("overfly: {error}; the ground is coarser there (depth {})", key.depth());
+            eprintln!("overfly: {error} (a page of depth {})", key.depth());
         }
         Ok(true)
     }
