@@ -20,11 +20,19 @@ pub struct Package {
 pub const DRAWING: &[Package] = &[
     Package { name: "libvulkan1", why: "the Vulkan loader" },
     Package { name: "mesa-vulkan-drivers", why: "Vulkan drivers, one without a GPU among them" },
+    Package { name: "libx11-6", why: "windows" },
+    Package { name: "libx11-xcb1", why: "windows" },
+    Package { name: "libxcursor1", why: "windows" },
+    Package { name: "libxi6", why: "keys and mouse of windows" },
+    Package { name: "libxrandr2", why: "windows on several monitors" },
+    Package { name: "libxkbcommon-x11-0", why: "keyboards of windows" },
 ];
 
 /// What tests of drawing need as well.
-pub const VALIDATION: &[Package] =
-    &[Package { name: "vulkan-validationlayers", why: "Vulkan's own checks, for the tests" }];
+pub const VALIDATION: &[Package] = &[
+    Package { name: "vulkan-validationlayers", why: "Vulkan's own checks, for the tests" },
+    Package { name: "xvfb", why: "a screen that nobody sees, for the tests of the window" },
+];
 
 /// Folders in which drivers tell the Vulkan loader of themselves.
 const DRIVER_FOLDERS: [&str; 3] =
