@@ -113,6 +113,7 @@ fn unsafe_stands_only_where_it_may() {
         "jobs/tests/allocation.rs",
         "jobs/benches/jobs/heap.rs",
         "core/tests/ground_allocation.rs",
+        "render_vk/tests/drawing_allocation.rs",
         "tests/pays_nothing.rs",
         "tests/architecture.rs",
     ];

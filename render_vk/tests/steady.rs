@@ -3,7 +3,7 @@
 //! In:    the planet of `planet`; how much is new from picture to picture.
 //! Out:   uploads in proportion to it; no new pipeline, no new memory on the device.
 //! Keeps: nothing.
-//! Not here: allocations of the host (`tests/pays_nothing.rs` of the workspace), times (benches).
+//! Not here: allocations of the host (`drawing_allocation`), times (benches).
 
 mod planet;
 #[expect(dead_code, reason = "settings and skipping only: there is a planet to draw")]

@@ -435,7 +435,10 @@ fn place(terrain: &Terrain, team: &Team<'_>) {
     let mut placed = terrain.placed.lock();
     let mut output = terrain.output.lock();
     let (depth, leaves) = (&terrain.settings.depth, terrain.limits.leaves);
-    if output.views.len() != eyes.cameras.len() {
+    // A host may have taken views out, or put others in.
+    let ranges = depth.splits_m.len() + 1;
+    let fits = |view: &ViewDraws| view.ranges.len() == ranges;
+    if output.views.len() != eyes.cameras.len() || !output.views.iter().all(fits) {
         let draws = |camera: &Camera| empty_draws(*camera, depth, leaves);
         output.views = eyes.cameras.iter().map(draws).collect();
     }
