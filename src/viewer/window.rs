@@ -66,12 +66,17 @@ impl std::error::Error for NoScreen {}
 
 fn no_window(error: impl fmt::Display) -> NoScreen {
     let hint = if cfg!(target_os = "linux") {
-        " (is DISPLAY or WAYLAND_DISPLAY set? X11 needs libx11-6, libx11-xcb1, libxcursor1, \
-         libxi6, libxrandr2 and libxkbcommon-x11-0)"
+        " (is DISPLAY set? Windows are X11's; on Debian they need libx11-6, libx11-xcb1, \
+         libxcursor1, libxi6, libxrandr2 and libxkbcommon-x11-0)"
     } else {
         ""
     };
-    NoScreen(format!("no window can be opened: {error}{hint}"))
+    // winit begins with the line of its own source that found out.
+    let text = error.to_string();
+    let what = text
+        .split_once(".rs:")
+        .map_or(text.as_str(), |(_, rest)| rest.split_once(": ").map_or(rest, |(_, what)| what));
+    NoScreen(format!("no window can be opened: {what}{hint}"))
 }
 
 /// Opens a window, and flies in it until it is closed.
