@@ -3,7 +3,7 @@
 //! In:    flights and presets.
 //! Out:   passes or fails.
 //! Keeps: nothing.
-//! Not here: the same through the command line (`recordings`), drawing (`pictures`).
+//! Not here: golden digests (`replay/tests/goldens.rs`), the command line (`recordings`).
 
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
@@ -122,28 +122,6 @@ fn worker_counts_do_not_change_a_bit() {
             .map(|workers| Tour::new(flight, scene, workers).digest_of((0..6000).step_by(25)));
         assert_eq!(digests, [digests[0]; 4], "{flight} over {scene}");
     }
-}
-
-/// The same in debug and release, on every machine: a change of these is a change of behaviour.
-#[test]
-fn golden_digests_hold() {
-    let golden = [
-        ("rainier", "earth", 0x4c43_ff91_a663_8d02),
-        ("descent", "moon", 0xb8e0_d8ce_9076_58fc),
-        ("poles", "small", 0x0fef_d5eb_2e82_002a),
-    ];
-    let found = golden.map(|(flight, scene, _)| {
-        let mut tour = Tour::without_morphs(flight, scene, 1);
-        (flight, scene, tour.digest_of((0..10_000).step_by(50)))
-    });
-    assert_eq!(found, golden, "{found:#x?}");
-}
-
-/// As above, with vertices on their way from the surface that they refine.
-#[test]
-fn the_golden_digest_of_morphing_vertices_holds() {
-    let found = Tour::new("descent", "small", 1).digest_of(2400..2600);
-    assert_eq!(found, 0xfa64_fc5f_35f5_beab, "{found:#x}");
 }
 
 #[test]

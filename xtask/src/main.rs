@@ -163,8 +163,8 @@ fn test(root: &Path) -> Result<(), Stopped> {
     let why = "the digests of the debug build, from the release build";
     let golden = Step::new("release", why, &cargo());
     let arguments =
-        ["test", "--release", "--locked", "--package", "overfly", "--test", "contracts"];
-    let tested = tested.and(run_tests(root, &golden.with(&arguments).with(&["golden"])));
+        ["test", "--release", "--locked", "--package", "overfly-replay", "--test", "goldens"];
+    let tested = tested.and(run_tests(root, &golden.with(&arguments)));
     if required {
         println!("Vulkan tests had to run: {require} was set.");
     } else {
