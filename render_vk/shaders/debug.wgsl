@@ -43,7 +43,9 @@ fn edges(at: vec2<f32>) -> vec2<f32> {
     let wide = vec2<f32>(fwidth(at.x), fwidth(at.y));
     let straight = min(min(f.x, 1.0 - f.x) / wide.x, min(f.y, 1.0 - f.y) / wide.y);
     let slanted = diagonal / fwidth(select(at.x + at.y, at.x - at.y, even));
-    let end = (view.segments - at.x - at.y) / fwidth(at.x + at.y);
+    // A patch of n segments has (n + 1) (n + 2) / 2 vertices.
+    let segments = (sqrt(8.0 * f32(view.vertices_per_patch) + 1.0) - 3.0) * 0.5;
+    let end = (segments - at.x - at.y) / fwidth(at.x + at.y);
     let border = min(min(at.x / wide.x, at.y / wide.y), end);
     return vec2<f32>(min(straight, slanted), border);
 }

@@ -1,6 +1,6 @@
 // What every program knows: the view and the depth range.
 
-// ---- `ViewTerms` in src/matrices.rs, 160 bytes ----
+// ---- `ViewTerms` in src/matrices.rs, 144 bytes ----
 struct View {
     eye_hi: vec3<f32>,        // body-fixed eye, metres, as a two-float
     air: f32,                 // 1 with an atmosphere, else 0
@@ -16,14 +16,12 @@ struct View {
     eye_height_m: f32,
     sun: vec3<f32>,           // towards the light
     sun_on: f32,              // 1 with a sun; 0: lit evenly from above the eye
-    detail_m: vec3<f32>,      // the eye in a cube of 4096 m, for what is fixed to the body
     pixel_rad: f32,           // angle of a pixel in the middle of the picture
     now_ms: u32,              // time of the flight, modulo 2^32
     morph_ms: f32,            // how long a vertex takes to its own place
     show: u32,                // `Show` in src/picture.rs
     tolerance_px: f32,
     vertices_per_patch: u32,
-    segments: f32,            // along each edge of a patch
     pixels_inverse: vec2<f32>, // 1 / width and height of the picture
 }
 

@@ -58,8 +58,8 @@ use crate::vk::{Device, commands::OneOff, transfer};
 use gpu_allocator::MemoryLocation;
 use overfly_core::frame::data::DeviceTotals;
 use overfly_core::geodesy::narrow;
+use overfly_core::mesh::Patches;
 use overfly_core::mesh::drape::NewTile;
-use overfly_core::mesh::{Patches, topology};
 use overfly_core::settings::DepthFormat;
 use overfly_jobs::Team;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
@@ -159,7 +159,6 @@ impl Renderer {
                 morph_ms: narrow(f64::from(settings.morph_ms())),
                 tolerance_px: narrow(settings.tolerance_px),
                 vertices_per_patch: settings.vertices_per_patch(),
-                segments: narrow(f64::from(topology::segments(settings.patch_depth))),
             },
             range_passes,
             targets,

@@ -28,22 +28,16 @@ pub(crate) struct ViewTerms {
     eye_height_m: f32,
     sun: [f32; 3],
     sun_on: f32,
-    /// The eye's place in a cube of [`DETAIL_M`], so that textures are fixed to the body.
-    detail_m: [f32; 3],
     pixel_rad: f32,
     now_ms: u32,
     morph_ms: f32,
     show: u32,
     tolerance_px: f32,
     vertices_per_patch: u32,
-    segments: f32,
     pixels_inverse: [f32; 2],
 }
 
-const _: () = assert!(size_of::<ViewTerms>() == 160);
-
-/// Textures repeat in a whole number of periods along this many metres of every axis.
-const DETAIL_M: f64 = 4096.0;
+const _: () = assert!(size_of::<ViewTerms>() == 144);
 
 /// What of a renderer's settings the shaders know.
 #[derive(Clone, Copy)]
@@ -51,7 +45,6 @@ pub(crate) struct Fixed {
     pub(crate) morph_ms: f32,
     pub(crate) tolerance_px: f32,
     pub(crate) vertices_per_patch: u32,
-    pub(crate) segments: f32,
 }
 
 impl ViewTerms {
@@ -77,14 +70,12 @@ impl ViewTerms {
             eye_height_m: narrow(camera.height_m),
             sun: narrowed(sun),
             sun_on: flag(parts.sun_direction.is_some()),
-            detail_m: narrowed(camera.eye.0 - (camera.eye.0 / DETAIL_M).floor() * DETAIL_M),
             pixel_rad: narrow(1.0 / camera.pixels_per_radian),
             now_ms: picture.time_ms,
             morph_ms: fixed.morph_ms,
             show: picture.show.code(),
             tolerance_px: fixed.tolerance_px,
             vertices_per_patch: fixed.vertices_per_patch,
-            segments: fixed.segments,
             pixels_inverse: camera.size_px.map(|n| narrow(1.0 / f64::from(n))),
         }
     }
