@@ -6,9 +6,9 @@
 //! Not here: drawing (`session`), stills of a replay (`cli::stills`).
 
 use super::session::scene_of;
+use crate::cli::stills::write_png;
 use crate::cli::{Failure, write_whole};
 use glam::{DQuat, DVec3};
-use image::{ImageFormat, RgbaImage};
 use overfly::core::camera::View;
 use overfly::core::digest::{Chain, mix};
 use overfly::core::geodesy::Ecef;
@@ -16,7 +16,6 @@ use overfly::core::settings::{SceneSettings, SunSettings};
 use overfly::core::units::{Pixels, Radians};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 /// Everything that a picture depends on, beside the data of the scene.
@@ -142,17 +141,12 @@ impl Sidecar {
 /// # Errors
 /// The folder cannot be written to, or `pixels` are not as many as the sidecar's size says.
 pub fn write(folder: &Path, pixels: Vec<u8>, sidecar: &Sidecar) -> Result<PathBuf, Failure> {
-    let [width, height] = sidecar.size_px;
-    let picture = RgbaImage::from_raw(width, height, pixels)
-        .ok_or("the renderer gave a picture of another size")?;
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png)?;
     let name = |number: u32| folder.join(format!("view-{number:04}.png"));
     let path = (1..)
         .map(name)
         .find(|path| !path.exists() && !path.with_extension("ron").exists())
         .ok_or("there is no free name left")?;
-    write_whole(&path, bytes.get_ref())?;
+    write_png(&path, sidecar.size_px, pixels)?;
     write_whole(&path.with_extension("ron"), sidecar.text().as_bytes())?;
     Ok(path)
 }
