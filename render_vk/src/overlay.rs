@@ -212,7 +212,7 @@ mod tests {
             let glyph = BASIC_FONTS.get(c).or_else(|| LATIN_FONTS.get(c)).unwrap();
             glyph.iter().map(|row| row.count_ones()).sum::<u32>()
         };
-        assert_eq!(area, (bits('I') + bits('°')) as f32);
+        assert_eq!(area, narrow(f64::from(bits('I') + bits('°'))));
         assert!(bits('°') > 0);
         overlay.clear();
         assert!(overlay.is_empty());
