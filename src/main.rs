@@ -29,6 +29,8 @@ enum Command {
     Still(cli::still::Arguments),
     /// Opens a window to fly in, and to watch flights and recordings.
     View(cli::view::Arguments),
+    /// Measures how far what is drawn strays from the ground, over a flight.
+    Measure(cli::measure::Arguments),
     /// Checks a scene file and shows what it resolves to; all faults at once.
     Check(cli::check::Arguments),
     /// Says how high the ground is at places, and how sure that is; CSV or JSON.
@@ -51,6 +53,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => cli::replay::run(&arguments),
         Command::Still(arguments) => cli::still::run(&arguments),
         Command::View(arguments) => cli::view::run(&arguments),
+        Command::Measure(arguments) => cli::measure::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
         Command::Probe(arguments) => cli::probe::run(&arguments),
         Command::Ingest(arguments) => cli::ingest::run(&arguments),

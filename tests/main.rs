@@ -11,6 +11,7 @@ mod contracts {
     mod command_line;
     mod cracks;
     mod depths;
+    mod extremes;
     mod flights;
     mod grounds;
     mod hills;

@@ -5,6 +5,7 @@
 //! Keeps: nothing.
 //! Not here: which diamonds are visible (`lod`), matrices in f32 (`overfly_render_vk`).
 
+use crate::datasource::PageKey;
 use crate::geodesy::{Ecef, Ellipsoid, Geodetic};
 use crate::units::Radians;
 use core::fmt;
@@ -14,6 +15,8 @@ use glam::{DMat3, DQuat, DVec3};
 const FIELD_OF_VIEW_MIN: Radians = Radians(1e-6);
 /// So would nearer ground.
 const NEAR_MIN_M: f64 = 1e-6;
+/// Farther off than this squares of lengths could overflow in what is computed next, and f32 could.
+const FAR_MAX_M: f64 = 1e30;
 
 /// One view of a frame, as a host gives it and a recording keeps it.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -30,13 +33,22 @@ pub struct View {
     pub near_m: f64,
 }
 
-/// Why a view cannot be used. The frame goes on with the previous views.
+/// Why a frame cannot begin. Nothing was taken and the terrain is as it was.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum ViewFault {
-    /// A position, orientation or lens value is NaN or infinite.
+    /// A number of a view is NaN or infinite.
     NotFinite {
         /// Which field.
         field: &'static str,
+        /// What was given.
+        found: f64,
+    },
+    /// A coordinate of the eye, or the near distance, is beyond ±1e30 m.
+    TooFar {
+        /// Which field.
+        field: &'static str,
+        /// What was given, in metres.
+        found_m: f64,
     },
     /// The orientation quaternion is zero.
     NoOrientation,
@@ -46,29 +58,70 @@ pub enum ViewFault {
         found_rad: f64,
     },
     /// Width or height is zero.
-    NoPixels,
+    NoPixels {
+        /// What was given.
+        found_px: [u32; 2],
+    },
     /// The near distance is less than 1e-6 m.
     Near {
         /// What was given, in metres.
         found_m: f64,
+    },
+    /// The time of the frame is NaN or infinite.
+    Time {
+        /// What was given, in seconds.
+        found_s: f64,
+    },
+    /// An arrived page says what no ground can be.
+    Page {
+        /// Which page.
+        key: PageKey,
+        /// Which of its numbers.
+        field: &'static str,
+        /// What was found, in metres.
+        found_m: f32,
+        /// Least and greatest that it may be, in metres.
+        allowed_m: [f32; 2],
+    },
+    /// The calling thread does not compute as IEEE 754 has it.
+    Arithmetic {
+        /// How, and what is allowed, as a sentence.
+        sentence: &'static str,
     },
 }
 
 impl fmt::Display for ViewFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotFinite { field } => write!(f, "view: {field} is not finite"),
-            Self::NoOrientation => write!(f, "view: orientation is the zero quaternion"),
+            Self::NotFinite { field, found } => {
+                write!(f, "view: {field} is {found}, allowed is any finite number")
+            }
+            Self::TooFar { field, found_m } => {
+                write!(f, "view: {field} is {found_m:e} m, allowed is -1e30 to 1e30")
+            }
+            Self::NoOrientation => {
+                write!(f, "view: orientation is the zero quaternion, allowed is any other")
+            }
             Self::FieldOfView { found_rad } => {
                 write!(
                     f,
                     "view: field of view is {found_rad} rad, allowed is 1e-6 to π, π excluded"
                 )
             }
-            Self::NoPixels => write!(f, "view: width and height must be at least 1 pixel"),
-            Self::Near { found_m } => {
-                write!(f, "view: near distance is {found_m} m, must be at least 1e-6")
+            Self::NoPixels { found_px: [width, height] } => {
+                write!(f, "view: size is {width} by {height} pixels, allowed is 1 by 1 or more")
             }
+            Self::Near { found_m } => {
+                write!(f, "view: near distance is {found_m} m, allowed is 1e-6 or more")
+            }
+            Self::Time { found_s } => {
+                write!(f, "time is {found_s} s, allowed is any finite number")
+            }
+            Self::Page { key, field, found_m, allowed_m: [least_m, most_m] } => write!(
+                f,
+                "page {key:?}: {field} is {found_m} m, allowed is {least_m} to {most_m:e}"
+            ),
+            Self::Arithmetic { sentence } => f.write_str(sentence),
         }
     }
 }
@@ -81,13 +134,14 @@ impl View {
     /// # Errors
     /// The first fault found.
     pub fn check(&self) -> Result<(), ViewFault> {
-        let finite =
-            |ok: bool, field| if ok { Ok(()) } else { Err(ViewFault::NotFinite { field }) };
-        finite(self.eye.0.is_finite(), "eye")?;
-        finite(self.orientation.is_finite(), "orientation")?;
-        finite(self.field_of_view.0.is_finite(), "field of view")?;
-        finite(self.near_m.is_finite(), "near distance")?;
-        if self.orientation.length_squared() == 0.0 {
+        self.check_finite()?;
+        let eye = self.eye.0.to_array().map(|c| ("eye", c));
+        for (field, found_m) in eye.into_iter().chain([("near distance", self.near_m)]) {
+            if found_m.abs() > FAR_MAX_M {
+                return Err(ViewFault::TooFar { field, found_m });
+            }
+        }
+        if self.orientation.to_array() == [0.0; 4] {
             return Err(ViewFault::NoOrientation);
         }
         if !(self.field_of_view.0 >= FIELD_OF_VIEW_MIN.0
@@ -96,13 +150,34 @@ impl View {
             return Err(ViewFault::FieldOfView { found_rad: self.field_of_view.0 });
         }
         if self.size_px.contains(&0) {
-            return Err(ViewFault::NoPixels);
+            return Err(ViewFault::NoPixels { found_px: self.size_px });
         }
         if self.near_m < NEAR_MIN_M {
             return Err(ViewFault::Near { found_m: self.near_m });
         }
         Ok(())
     }
+
+    fn check_finite(&self) -> Result<(), ViewFault> {
+        let eye = self.eye.0.to_array().map(|c| ("eye", c));
+        let orientation = self.orientation.to_array().map(|c| ("orientation", c));
+        let lens = [("field of view", self.field_of_view.0), ("near distance", self.near_m)];
+        let mut all = eye.into_iter().chain(orientation).chain(lens);
+        let fault = all.find(|(_, found)| !found.is_finite());
+        fault.map_or(Ok(()), |(field, found)| Err(ViewFault::NotFinite { field, found }))
+    }
+}
+
+/// A quaternion of length 1, from one of any length but zero. Where squares keep their digits it is
+/// divided by its length alone.
+fn normalised(orientation: DQuat) -> DQuat {
+    let squared = orientation.length_squared();
+    if squared > 1e-200 && squared < 1e200 {
+        return orientation.normalize();
+    }
+    let most = orientation.to_array().into_iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+    let scaled = orientation.to_array().map(|c| c / most);
+    DQuat::from_array(scaled).normalize()
 }
 
 /// The orientation of a camera that looks along the nose of an aircraft.
@@ -165,7 +240,7 @@ impl Camera {
     /// The camera of a checked view before `body`.
     pub fn new(view: &View, body: &Ellipsoid) -> Self {
         let ground = body.geodetic_from_ecef(view.eye);
-        let axes = DMat3::from_quat(view.orientation.normalize());
+        let axes = DMat3::from_quat(normalised(view.orientation));
         let (right, up, forward) = (axes.x_axis, axes.y_axis, -axes.z_axis);
         let [width, height] = view.size_px.map(f64::from);
         let tan_y = crate::geodesy::trig::tan(view.field_of_view.0 / 2.0);
@@ -245,8 +320,13 @@ mod tests {
             change(&mut view);
             view.check().unwrap_err()
         };
-        assert_eq!(with(|v| v.eye.0.x = f64::NAN), ViewFault::NotFinite { field: "eye" });
-        assert_eq!(with(|v| v.size_px[1] = 0), ViewFault::NoPixels);
+        let not_finite = with(|v| v.eye.0.x = f64::NAN);
+        assert!(
+            matches!(not_finite, ViewFault::NotFinite { field: "eye", found } if found.is_nan())
+        );
+        let far = with(|v| v.eye.0.z = -1e31);
+        assert_eq!(far, ViewFault::TooFar { field: "eye", found_m: -1e31 });
+        assert_eq!(with(|v| v.size_px = [7, 0]), ViewFault::NoPixels { found_px: [7, 0] });
         assert_eq!(with(|v| v.near_m = 0.0), ViewFault::Near { found_m: 0.0 });
         assert_eq!(
             with(|v| v.orientation = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)),

@@ -99,6 +99,7 @@
 //! written for any kind of atomics (`sync`); the crate's tests run them under loom and shuttle.
 #![deny(unsafe_code)]
 
+mod arithmetic;
 mod cancel;
 mod chaos;
 mod crew;
@@ -121,6 +122,7 @@ mod tickets;
 mod walk;
 mod workers;
 
+pub use arithmetic::{ArithmeticFault, check_arithmetic};
 pub use cancel::{Cancel, Stopped};
 pub use frame::Frame;
 pub use graph::{Graph, StageId};

@@ -5,6 +5,7 @@
 //! Keeps: the threads until dropped, the handles of the host's tasks while a frame is open.
 //! Not here: what workers share and how they sleep (`crew`), the order of stages (`walk`).
 
+use crate::arithmetic::{ArithmeticFault, check_arithmetic};
 use crate::chaos::Chaos;
 use crate::crew::{Crew, CrewSize, LANES_MAX};
 use crate::frame::{Engaged, Frame};
@@ -29,6 +30,8 @@ pub enum StartError {
     Spawn(io::Error),
     /// The system refused to bind a thread to its core. All threads have ended.
     Pin(io::Error),
+    /// Threads would inherit arithmetic that is not IEEE 754's from this one.
+    Arithmetic(ArithmeticFault),
 }
 
 impl fmt::Display for StartError {
@@ -39,6 +42,7 @@ impl fmt::Display for StartError {
             }
             StartError::Spawn(_) => write!(out, "a worker thread could not be started"),
             StartError::Pin(_) => write!(out, "a worker thread could not be bound to its core"),
+            StartError::Arithmetic(fault) => write!(out, "workers cannot be started: {fault}"),
         }
     }
 }
@@ -46,7 +50,8 @@ impl fmt::Display for StartError {
 impl Error for StartError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            StartError::TooMany { .. } => None,
+            // Its sentence is in the message already.
+            StartError::TooMany { .. } | StartError::Arithmetic(_) => None,
             StartError::Spawn(cause) | StartError::Pin(cause) => Some(cause),
         }
     }
@@ -115,7 +120,7 @@ impl Workers {
     /// Starts `workers` threads, 0 to 64, beside the caller.
     ///
     /// # Errors
-    /// [`StartError`] if the number is too large or the system refuses a thread.
+    /// [`StartError`] as in [`Workers::with`].
     pub fn new(workers: usize) -> Result<Workers, StartError> {
         Workers::with(WorkerOptions { count: workers, ..WorkerOptions::default() })
     }
@@ -123,8 +128,10 @@ impl Workers {
     /// Starts threads as the options say.
     ///
     /// # Errors
-    /// [`StartError`] if there are too many, or the system refuses a thread or its core.
+    /// [`StartError`] if there are too many, if this thread's arithmetic, which they inherit, is
+    /// not IEEE 754's, or if the system refuses a thread or its core.
     pub fn with(options: WorkerOptions) -> Result<Workers, StartError> {
+        check_arithmetic().map_err(StartError::Arithmetic)?;
         let asked = options.count.saturating_add(options.seats);
         if asked > LANES_MAX {
             return Err(StartError::TooMany { asked });
@@ -200,7 +207,8 @@ impl Workers {
     }
 
     /// Lends this thread until the frame that is open now closes. `false`, at once, if none is
-    /// open, if all seats are taken, or if this thread is in a frame itself or works already.
+    /// open, if all seats are taken, if this thread is in a frame itself or works already, or if
+    /// it would compute other bits than the caller ([`check_arithmetic`]).
     pub fn join_as_worker(&self) -> bool {
         self.crew.opening().is_some_and(|opening| visit(&self.crew, opening))
     }
@@ -257,7 +265,7 @@ fn live(crew: &Crew, lane: usize, core: Option<usize>, report: Sender<io::Result
 }
 
 fn visit(crew: &Crew, opening: u64) -> bool {
-    if Engaged::anywhere() {
+    if Engaged::anywhere() || check_arithmetic().is_err() {
         return false;
     }
     let _engaged = Engaged::new();
@@ -273,8 +281,8 @@ pub struct Task {
 }
 
 impl Task {
-    /// Works until the task's frame closes. Returns at once if it is closed already, or if this
-    /// thread is in a frame itself or works already.
+    /// Works until the task's frame closes. Returns at once if it is closed already, if this
+    /// thread is in a frame itself or works already, or if it would compute other bits.
     pub fn run(self) {
         visit(&self.crew, self.opening);
     }

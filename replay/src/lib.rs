@@ -7,6 +7,7 @@
 //! | [`write`](mod@write), [`read`] | files, frame by frame |
 //! | [`flight`](mod@flight) | flights in memory, and the three that come with overfly |
 //! | [`resample`] | flights from CSV files of a flight simulator |
+//! | [`measure`](mod@measure) | errors of what is drawn, in pixels and metres |
 //! | [`compare`], [`stats`] | which stage differs first; percentiles of columns |
 //!
 //! In:    poses, frames, digests; files.
@@ -18,6 +19,7 @@
 pub mod compare;
 pub mod flight;
 pub mod format;
+pub mod measure;
 mod payload;
 pub mod pose;
 pub mod read;

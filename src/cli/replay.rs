@@ -69,7 +69,8 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-fn parse_frames(text: &str) -> Result<Range<usize>, String> {
+/// Frames as A..B.
+pub fn parse_frames(text: &str) -> Result<Range<usize>, String> {
     let wrong = || format!("`{text}` is not A..B with whole numbers and A below B");
     let (a, b) = text.split_once("..").ok_or_else(wrong)?;
     let range = a.parse().map_err(|_| wrong())?..b.parse().map_err(|_| wrong())?;

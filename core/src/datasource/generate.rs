@@ -10,6 +10,7 @@ use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, ho
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
 use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
+use super::probes::{Findings, Probes, SURPRISE, Site};
 use super::procedural::detail::Detail;
 use super::procedural::{Planet, Style};
 use super::tile::Tile;
@@ -171,6 +172,69 @@ impl Generator {
                 page.bounds[place] = self.bound(page, point, &ground, plots);
             }
         }
+        if self.bed.is_procedural() {
+            self.tighten(page, plots);
+        }
+    }
+
+    /// Lowers the bounds of a page of the planet to what the ground around its samples shows.
+    fn tighten(&self, page: &mut Page, plots: &mut Plots<'_>) {
+        let site = Site { key: page.key, patch_depth: self.patch_depth };
+        let ground_m = |point| plots.ground(point).height_m;
+        let Some(probes) = Probes::new(site, &page.heights_m, ground_m) else { return };
+        for (j, i) in (0..BOUND_SIDE).flat_map(|j| (0..BOUND_SIDE).map(move |i| (j, i))) {
+            let at = BOUND_STRIDE * j * PAGE_SIDE + BOUND_STRIDE * i;
+            let point = page.key.sample(BOUND_STRIDE * i, BOUND_STRIDE * j);
+            let seen = self.seen_bound(&probes.around(i, j), f64::from(page.heights_m[at]), {
+                self.sagitta_m(page.key, point)
+            });
+            let bound = &mut page.bounds[j * BOUND_SIDE + i];
+            let min = |a: f32, b: f32| if b < a { b } else { a };
+            *bound = Bound {
+                error_odd_m: min(bound.error_odd_m, seen.error_odd_m),
+                error_even_m: min(bound.error_even_m, seen.error_even_m),
+                variation_m: min(bound.variation_m, seen.variation_m),
+            };
+        }
+    }
+
+    /// The bound that follows from what was seen within reach.
+    fn seen_bound(&self, found: &Findings, height_m: f64, sagitta_m: [f64; 2]) -> Bound {
+        let [low_m, high_m] = found.range_m;
+        let residual_m = found.residual_m.map(|residual_m| SURPRISE * residual_m);
+        // Between probes the ground may rise by another block's relief.
+        let doubt_m = found.relief_m + residual_m[0];
+        let (low_m, high_m) = (low_m - doubt_m, high_m + doubt_m);
+        let (below_m, above_m) = (height_m - low_m, high_m - height_m);
+        let corner_m = 0.25 * found.relief_m;
+        let error = |level: usize| {
+            let drawn_m = match (self.sea && high_m < 0.0, self.sea && low_m < 0.0) {
+                (true, _) => 0.0,
+                (_, true) => residual_m[level] + corner_m,
+                _ => residual_m[level],
+            };
+            narrow((drawn_m + sagitta_m[level]) * ROUNDING)
+        };
+        Bound {
+            error_odd_m: error(0),
+            error_even_m: error(1),
+            variation_m: narrow(
+                (if below_m > above_m { below_m } else { above_m }) * ROUNDING + 1e-3,
+            ),
+        }
+    }
+
+    /// How far triangles of odd and even levels sag below the ellipsoid at a sample, at most.
+    fn sagitta_m(&self, key: PageKey, point: IVec3) -> [f64; 2] {
+        let step = f64::from(key.step());
+        let leaf_side = step * f64::from(1_u32 << (self.patch_depth / 2));
+        let reach = EXTENT_EVEN * leaf_side + DIAGONAL * step * 4.0;
+        let norm = (point.as_dvec3().length() - reach).max(NORM_MIN);
+        let [curvature_min, curvature_max] = self.body.curvature_radii_m();
+        edges(self.patch_depth).map(|edge| {
+            let edge_m = edge * step / norm * curvature_max;
+            edge_m * edge_m / (8.0 * curvature_min)
+        })
     }
 
     /// The bounds around a sample, over all that a diamond near it and its descendants can reach.

@@ -15,6 +15,7 @@ pub mod key;
 pub mod page;
 pub mod pages;
 
+mod probes;
 pub mod procedural;
 pub mod tile;
 

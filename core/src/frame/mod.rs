@@ -11,11 +11,12 @@ pub use data::{FrameCounts, FrameInput, FrameOutput, RangeDraws, ViewDraws};
 
 use crate::camera::{Camera, ViewFault};
 use crate::columns::Id;
-use crate::datasource::Page;
 use crate::datasource::generate::Generator;
 use crate::datasource::pages::{Admission, Pages};
+use crate::datasource::{Page, PageKey};
 use crate::digest::Chain;
-use crate::limits::Limits;
+use crate::geodesy::narrow;
+use crate::limits::{DEEPEST, Limits, SettingsFault, check_surface};
 use crate::lod::cover::{Cover, Planet, judge};
 use crate::lod::refine::{Knobs, Mesh, Refinement};
 use crate::lod::screen_error::{Horizon, Sight, motion_between};
@@ -26,7 +27,7 @@ use crate::mesh::morph::{Moment, Morphing};
 use crate::mesh::patches::Patches;
 use crate::mesh::place::{self, BLOCK_GRAIN, LIST_GRAIN, Placed, empty_draws, place_blocks};
 use crate::settings::SceneSettings;
-use overfly_jobs::{Graph, Span, StageId, Team};
+use overfly_jobs::{ArithmeticFault, Graph, Span, StageId, Team, check_arithmetic};
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
 use std::sync::Arc;
 
@@ -111,8 +112,25 @@ pub struct Terrain {
 
 impl Terrain {
     /// The terrain of a scene, with no page yet; every pool is allocated here.
+    ///
+    /// # Panics
+    /// Where [`Self::checked`] finds a fault, with the same words.
     pub fn new(settings: &SceneSettings, generator: &Generator) -> Self {
-        let limits = Limits::of(settings);
+        Self::checked(settings, generator).unwrap_or_else(|fault| panic!("settings: {fault}"))
+    }
+
+    /// The terrain of a scene, with no page yet; every pool is allocated here.
+    ///
+    /// # Errors
+    /// A setting is outside its range, or the sources go deeper than the body; nothing was
+    /// allocated.
+    pub fn checked(settings: &SceneSettings, generator: &Generator) -> Result<Self, SettingsFault> {
+        let limits = Limits::checked(settings)?;
+        check_surface(settings, generator.surface_range_m())?;
+        Ok(Self::made(settings, limits, generator))
+    }
+
+    fn made(settings: &SceneSettings, limits: Limits, generator: &Generator) -> Self {
         let patch_depth = settings.lod.patch_depth;
         let morphing = Morphing::new(settings.lod.morph_s, patch_depth);
         let morphs = morphing.is_some();
@@ -162,9 +180,17 @@ impl Terrain {
     /// Takes the next frame's input; run the graph, then call [`Self::finish`].
     ///
     /// # Errors
-    /// A view that cannot be used: nothing was taken and the terrain is as it was.
+    /// A view, a time or a page that cannot be used, or a thread whose arithmetic is not IEEE
+    /// 754's: nothing was taken and the terrain is as it was.
     pub fn begin(&self, input: &mut FrameInput) -> Result<(), ViewFault> {
+        let broken = |fault: ArithmeticFault| ViewFault::Arithmetic { sentence: fault.sentence() };
+        check_arithmetic().map_err(broken)?;
         input.views.iter().try_for_each(crate::camera::View::check)?;
+        if !input.time_s.is_finite() {
+            return Err(ViewFault::Time { found_s: input.time_s });
+        }
+        let deepest_m = -narrow(DEEPEST * self.horizon.curvature_m[0]);
+        input.arrived.iter().try_for_each(|page| check_page(page, deepest_m))?;
         core::mem::swap(&mut *self.input.lock(), input);
         Ok(())
     }
@@ -218,6 +244,28 @@ impl Terrain {
         audit::consistent(&lod.mesh, &lod.cover, &pages, &patches)?;
         audit::closed(&lod.mesh.diamonds, &lod.cover, &patches)
     }
+}
+
+/// Whether a page can be drawn: heights and bounds finite, no ground below `deepest_m`. Some
+/// microseconds, little beside making one.
+fn check_page(page: &Page, deepest_m: f32) -> Result<(), ViewFault> {
+    let bounds = page.bounds.iter().flat_map(|b| [b.error_odd_m, b.error_even_m, b.variation_m]);
+    check_all(page.key, ("height", deepest_m), page.heights_m.iter().copied())?;
+    check_all(page.key, ("bound", 0.0), bounds)
+}
+
+fn check_all(
+    key: PageKey,
+    (field, least_m): (&'static str, f32),
+    mut values: impl Iterator<Item = f32> + Clone,
+) -> Result<(), ViewFault> {
+    let holds = |m: f32| (m >= least_m) & (m <= f32::MAX);
+    // Without a way out of the loop it is vector code.
+    if values.clone().fold(true, |all, m| all & holds(m)) {
+        return Ok(());
+    }
+    let found_m = values.find(|&m| !holds(m)).expect("not all of them hold");
+    Err(ViewFault::Page { key, field, found_m, allowed_m: [least_m, f32::MAX] })
 }
 
 /// Adds the stages to a graph whose context holds a terrain; returns the last stage.

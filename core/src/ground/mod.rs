@@ -36,7 +36,7 @@ mod surface;
 mod walk;
 
 pub use answer::{Answer, Contact, Height, Hit, MinMax, Query, Readiness, Refraction, Sight};
-pub use patch::{CollisionPatch, PatchFault};
+pub use patch::{CollisionPatch, PatchFault, triangle_id};
 pub use place::{Cell, Corners, LEVEL_BOUNDED, LEVEL_MAX, Place};
 pub use region::{Region, RegionFault};
 

@@ -13,10 +13,10 @@ use super::region::{Cap, Region, each_square};
 use super::resident::Resident;
 use crate::datasource::PageKey;
 use crate::geodesy::{Ecef, Geodetic, narrow};
-use crate::lattice::{key_of, middle};
+use crate::lattice::{key_of, middle, unfold};
 use crate::lod::diamonds::leaf_key;
 use core::fmt;
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 /// A piece of ground as a triangle mesh. Reuse one with [`Ground::fill_patch`]: its buffers stay.
 #[derive(Clone, PartialEq, Debug)]
@@ -179,7 +179,7 @@ impl Ground {
         mut corners: Corners,
         patch: &mut CollisionPatch,
     ) {
-        patch.triangle_ids.push(triangle_id(cell, corners));
+        patch.triangle_ids.push(triangle_id(corners.map(|corner| cell.point(corner))));
         let triangle = self.shape.triangle(page, cell, corners);
         if cell.is_mirrored() {
             corners.swap(1, 2);
@@ -209,10 +209,11 @@ fn number_vertices(patch: &mut CollisionPatch) {
     }
 }
 
-/// The key of the hypotenuse's middle, which no other two triangles of any level share, and which
-/// of the two this is.
-fn triangle_id(cell: &Cell, corners: Corners) -> u64 {
-    let [apex, start, end] = corners.map(|corner| cell.point(corner));
+/// Names a triangle of any level by its apex and hypotenuse: the key of the hypotenuse's middle,
+/// which no other two triangles share, and which of the two this is. A leaf of the drawn mesh has
+/// the same corners, and so the same name, but for the order of the hypotenuse's ends, which does
+/// not matter here.
+pub fn triangle_id([apex, start, end]: [IVec3; 3]) -> u64 {
     let on_border = |axis: usize| start[axis] == 0 && end[axis] == 0;
     // A hypotenuse on a quadrant's border parts two quadrants, any other two halves of a square.
     let side = if on_border(0) {
@@ -220,7 +221,14 @@ fn triangle_id(cell: &Cell, corners: Corners) -> u64 {
     } else if on_border(1) {
         apex.y < 0
     } else {
-        let [apex, start, end] = corners.map(|corner| cell.unfolded(corner));
+        let sum = start + end;
+        let quadrant = match (sum.x >= 0, sum.y >= 0) {
+            (true, true) => 0,
+            (false, true) => 1,
+            (false, false) => 2,
+            (true, false) => 3,
+        };
+        let [apex, start, end] = [apex, start, end].map(|point| unfold(quadrant, point));
         apex > (start.0 + end.0 - apex.0, start.1 + end.1 - apex.1)
     };
     leaf_key(key_of(middle(start, end)), usize::from(side))

@@ -14,12 +14,29 @@
 //! deepest ground. Frustum. A plane's greatest value over the region is bounded term by term.
 //! Each bound only tightens when cap and height interval shrink: so priorities are nested.
 //!
+//! Lens. Errors are vertical. At depth z and tangents t of the picture, a vertical error e is
+//! |n⊥ − t·n_f|·e·f/z large, with the normal's parts across and along the view direction: at most
+//! A = |n⊥| + T·|n_f|, T the tangent of the corner, and at most √(1 + t²) = 1/cos θ. And z is d·cos θ.
+//! So the error is at most e·f/d times the lens min(A/c, 1/c²), c a lower bound on cos θ over the
+//! region in the picture: that of the corner, or z/D, the least depth over the greatest distance of
+//! any ground of the region. As a ball of the greatest radius of curvature M contains the ellipsoid
+//! and X(n) turns by at most M times the angle, D² ≤ (h−k)² + (M²(1 + 0.37s²) + (h + k)M + hk)s²
+//! with the chord s of both normals, negative heights counting as 0 in the product. Where an error
+//! is below the threshold even with the corner's lens, or above it with none, the lens does not
+//! matter; else it enters the slack as below.
+//!
 //! Certainty. With d the distance bound, the error is on the threshold where d = R = e·f/threshold.
 //! If the eye moves by m, the heights change by at most m and √((ρ+h)(ρ+k))·|n−m| by at most λm
 //! (λ is 1 nearby, see `stretch` below), so d changes by at most λm. Where the threshold over f
 //! falls or rises by a share Δ, R changes by at most RΔ. A plane's value over the region changes by
 //! at most m, and by L·φ when its unit normal changes by φ, L the region's farthest point. The
-//! horizon's reach changes with the tangent length of the eye. So a slack in metres, minus λm, RΔ,
+//! horizon's reach changes with the tangent length of the eye. Where the lens
+//! counts, the error is on the threshold where dg = R with g = max(c/A, c²). z changes by at most
+//! m + φD and D by μm, so c = z/D by at most δ = ((1 + μ)m + φD)/D downward and, while μm is below
+//! D/10, by 1.2δ upward; A by (1 + T)φ; d ≤ D. With a = max(1, 1/A), dg falls by at most
+//! a(λ + 2 + 2μ)m + a(2 + a(1 + T))dφ, and rises by at most a(1.5λ + 3 + 3μ)m +
+//! a(3 + 1.2a(1 + T))dφ while δ is below 0.4 and (1 + T)φ below A/10.
+//! So a slack in metres, minus λm, RΔ,
 //! Lφ and the tangents' change, stays positive for as long as `Lasts` tells.
 
 use super::agenda::Verdict;
@@ -79,7 +96,12 @@ pub struct Sight {
     normal: DVec3,
     height_m: f64,
     planes: [DVec3; 4],
+    forward: DVec3,
     pixels_per_radian: f64,
+    /// Least square of the cosine between the view direction and anything in the picture.
+    corner_cosine2: f64,
+    /// Tangent of that angle.
+    corner_tangent: f64,
     near_m: f64,
     tangent_m: f64,
     /// Greatest √((ρ + k)/(ρ + h)) of any ground k and any eye h for which verdicts last.
@@ -94,8 +116,7 @@ const DEEPEST_EYE: f64 = 0.9;
 impl Sight {
     /// The sight of a camera over a body.
     ///
-    /// An error e at distance d looks at most e·f·c/d pixels large, f the pixels per radian of the
-    /// picture's middle, c its corner factor: the screen is a plane, not a sphere.
+    /// Pixels per radian are those of the picture's middle; the lens accounts for the rest.
     pub fn new(camera: &Camera, horizon: Horizon) -> Self {
         let below = camera.height_m <= horizon.floor_m;
         let rho = horizon.curvature_m[0];
@@ -106,7 +127,10 @@ impl Sight {
             normal: camera.normal,
             height_m: camera.height_m,
             planes: camera.side_planes,
-            pixels_per_radian: camera.pixels_per_radian * camera.corner_factor,
+            forward: camera.forward,
+            pixels_per_radian: camera.pixels_per_radian,
+            corner_cosine2: 1.0 / camera.corner_factor,
+            corner_tangent: (camera.corner_factor - 1.0).sqrt(),
             near_m: camera.near_m,
             // From below all ground the horizon hides nothing.
             tangent_m: if below { f64::INFINITY } else { horizon.tangent_m(camera.height_m) },
@@ -125,8 +149,13 @@ impl Sight {
         if !same || self.height_m < deepest_m || before.height_m < deepest_m {
             return None;
         }
-        let turns = self.planes.iter().zip(&before.planes).map(|(now, was)| (*now - *was).length());
-        let (now, was) = (self.pixels_per_radian, before.pixels_per_radian);
+        let turned = |now: DVec3, was: DVec3| (now - was).length();
+        let turns = self.planes.iter().zip(&before.planes).map(|(now, was)| turned(*now, *was));
+        let turn = turns.fold(turned(self.forward, before.forward), f64::max);
+        let change = |now: f64, was: f64| (now - was).abs() / now.min(was);
+        let zoom = change(self.pixels_per_radian, before.pixels_per_radian)
+            + change(self.corner_cosine2, before.corner_cosine2)
+            + change(self.corner_tangent, before.corner_tangent);
         let lift_m = if self.tangent_m.is_finite() {
             (self.tangent_m - before.tangent_m).abs()
         } else {
@@ -136,8 +165,9 @@ impl Sight {
             path_m: (self.eye - before.eye).length(),
             step_m: DVec3::ZERO,
             lift_m,
-            turn: turns.fold(0.0, f64::max),
-            zoom: (now - was).abs() / now.min(was),
+            turn,
+            // Products of small changes, many times over.
+            zoom: zoom * (1.0 + zoom),
         })
     }
 
@@ -185,11 +215,45 @@ impl Sight {
     fn look(&self, region: &Region) -> Look {
         let distance_m = self.distance_m(region);
         let nearest_m = if distance_m > self.near_m { distance_m } else { self.near_m };
-        Look {
-            distance_m,
-            nearest_m,
-            error_px: region.error_m * self.pixels_per_radian / nearest_m,
-        }
+        Look { distance_m, nearest_m, flat_px: region.error_m * self.pixels_per_radian / nearest_m }
+    }
+
+    /// How the screen's plane enlarges errors of the region.
+    fn lens(&self, region: &Region) -> Lens {
+        let [_, curvature_m] = self.horizon.curvature_m;
+        let spread = 1.01 * curvature_m * region.cap;
+        let along = self.forward.dot(region.normal);
+        let lift = |height_m: f64| height_m * along - height_m.abs() * region.cap;
+        let (low, high) = (lift(region.low_m), lift(region.high_m));
+        let to_surface = self.forward.dot(region.surface - self.eye);
+        let depth_m = to_surface - spread + if low < high { low } else { high };
+        let chord = (self.normal - region.normal).length() + region.cap;
+        let chord = if chord < 2.0 { chord } else { 2.0 };
+        let (below, above) = (self.height_m - region.low_m, region.high_m - self.height_m);
+        let vertical = if below > above { below } else { above };
+        let h = if region.high_m > 0.0 { region.high_m } else { 0.0 };
+        let k = if self.height_m > 0.0 { self.height_m } else { 0.0 };
+        let bent = curvature_m * curvature_m * (1.0 + 0.37 * chord * chord);
+        let across = (bent + (h + k) * curvature_m + h * k) * chord * chord;
+        let far_m = (vertical * vertical + across).sqrt();
+        let cosine = if depth_m > 0.0 { depth_m / far_m } else { 0.0 };
+        let cosine2 = cosine * cosine;
+        let cosine2 = if cosine2 > self.corner_cosine2 { cosine2 } else { self.corner_cosine2 };
+        let least = |a: f64, b: f64| if a < b { a } else { b };
+        let aside = least(self.forward.cross(region.normal).length() + region.cap, 1.0);
+        let ahead = least(along.abs() + region.cap, 1.0);
+        let across = aside + self.corner_tangent * ahead;
+        let across = if across > ACROSS_MIN { across } else { ACROSS_MIN };
+        let by_across = cosine2.sqrt() / across;
+        let shrink = if by_across > cosine2 { by_across } else { cosine2 };
+        Lens { shrink, across, far_m }
+    }
+
+    /// Bound on the change of the greatest distance for each metre that the eye moves.
+    fn stretch_far(&self, region: &Region) -> f64 {
+        let [least, greatest] = self.horizon.curvature_m;
+        let chord = (self.normal - region.normal).length() + region.cap;
+        1.5 * (greatest / least) * self.stretch(region) * (1.0 + chord)
     }
 
     /// By how much the region is seen: the lesser margin before horizon and frustum, metres.
@@ -208,7 +272,10 @@ impl Sight {
     /// Error bound of the region on this view's screen, in pixels.
     pub fn error_px(&self, region: &Region) -> f64 {
         let look = self.look(region);
-        if self.seen_by_m(region, &look) < 0.0 { 0.0 } else { look.error_px }
+        if self.seen_by_m(region, &look) < 0.0 {
+            return 0.0;
+        }
+        look.flat_px / self.lens(region).shrink
     }
 
     /// Not less than the distance to any point of the region by which a turn moves it, metres.
@@ -227,18 +294,32 @@ impl Sight {
     /// For how long a leaf stays below `threshold_px` in this view, or its error.
     fn leaf(&self, region: &Region, threshold_px: f64) -> Verdict {
         let look = self.look(region);
-        if look.error_px < threshold_px {
-            let reach_m = region.error_m * self.pixels_per_radian / threshold_px;
-            let scale_m = look.nearest_m;
-            let slack_m = self.path_of(region, look.nearest_m - reach_m, scale_m);
+        let reach_m = region.error_m * self.pixels_per_radian / threshold_px;
+        let scale_m = look.nearest_m;
+        if look.flat_px < threshold_px * self.corner_cosine2 {
+            let slack_m = look.nearest_m - reach_m / self.corner_cosine2;
+            let slack_m = self.path_of(region, slack_m, scale_m);
             return Verdict::Certain(Lasts { family: Family::Far, scale_m, slack_m });
         }
         let seen_by_m = self.seen_by_m(region, &look);
-        if seen_by_m >= 0.0 {
-            return Verdict::Urgent(look.error_px);
+        if seen_by_m < 0.0 {
+            let scale_m = self.farthest_m(region).max(look.nearest_m);
+            let slack_m = self.path_of(region, -seen_by_m, scale_m);
+            return Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m });
         }
-        let scale_m = self.farthest_m(region).max(look.nearest_m);
-        let slack_m = self.path_of(region, -seen_by_m, scale_m);
+        let lens = self.lens(region);
+        let error_px = look.flat_px / lens.shrink;
+        if error_px >= threshold_px {
+            return Verdict::Urgent(error_px);
+        }
+        let slack_m = look.nearest_m * lens.shrink - reach_m - 1e-9 * lens.far_m - 1e-6;
+        let strength = lens.strength();
+        let path = self.stretch(region) + 2.0 + 2.0 * self.stretch_far(region);
+        let turn = (2.0 + strength * (1.0 + self.corner_tangent)) / path;
+        let slack_m = slack_m / (strength * path);
+        let most_m = 0.1 * self.horizon.curvature_m[0];
+        let slack_m = if slack_m < most_m { slack_m } else { most_m };
+        let scale_m = scale_m * if turn > 1.0 { turn } else { 1.0 };
         Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m })
     }
 
@@ -249,14 +330,50 @@ impl Sight {
         if seen_by_m < 0.0 {
             return Verdict::Urgent(0.0);
         }
-        if look.error_px <= threshold_px {
-            return Verdict::Urgent(look.error_px);
-        }
         let reach_m = region.error_m * self.pixels_per_radian / threshold_px;
-        let scale_m = self.farthest_m(region).max(reach_m);
-        let slack_m = (reach_m - look.nearest_m).min(seen_by_m);
-        let slack_m = self.path_of(region, slack_m, scale_m);
+        let farthest_m = self.farthest_m(region);
+        if look.flat_px > threshold_px {
+            let scale_m = farthest_m.max(reach_m);
+            let slack_m = (reach_m - look.nearest_m).min(seen_by_m);
+            let slack_m = self.path_of(region, slack_m, scale_m);
+            return Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m });
+        }
+        let lens = self.lens(region);
+        let error_px = look.flat_px / lens.shrink;
+        if error_px <= threshold_px {
+            return Verdict::Urgent(error_px);
+        }
+        // What is left of dg, and of sight.
+        let slack_m = reach_m - look.nearest_m * lens.shrink - 1e-9 * lens.far_m - 1e-6;
+        let (strength, tangent) = (lens.strength(), 1.0 + self.corner_tangent);
+        let far = self.stretch_far(region);
+        let path = 1.5 * self.stretch(region) + 3.0 + 3.0 * far;
+        let turn = (3.0 + 1.2 * strength * tangent) / path;
+        let most_m = 0.1 * look.nearest_m * (1.0 / far).min(lens.across / tangent);
+        let lens_m = (slack_m / (strength * path)).min(most_m);
+        let slack_m = lens_m.min(self.path_of(region, seen_by_m, lens.far_m));
+        let scale_m = farthest_m.max(reach_m).max(lens.far_m) * turn.max(1.0);
         Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m })
+    }
+}
+
+/// How the screen's plane enlarges errors of a region.
+struct Lens {
+    /// What an error is divided by: at least the corner's squared cosine.
+    shrink: f64,
+    /// A: at most so much of a vertical error lies across the view direction.
+    across: f64,
+    /// Nothing of the region is farther, metres.
+    far_m: f64,
+}
+
+/// A is never taken for less, so that what depends on it changes slowly.
+const ACROSS_MIN: f64 = 0.25;
+
+impl Lens {
+    /// a: how strongly the lens changes with the view.
+    fn strength(&self) -> f64 {
+        if self.across < 1.0 { 1.0 / self.across } else { 1.0 }
     }
 }
 
@@ -270,11 +387,11 @@ pub fn motion_between(before: &[Sight], now: &[Sight]) -> Option<Motion> {
     now.iter().zip(before).map(of).try_fold(Motion::default(), |most, one| Some(most.most(one?)))
 }
 
-/// Distance and error of a region in a view, whether it is seen or not.
+/// Distance of a region and its error if it lay in the middle of the picture.
 struct Look {
     distance_m: f64,
     nearest_m: f64,
-    error_px: f64,
+    flat_px: f64,
 }
 
 /// Priority of a region: the largest error over all views.

@@ -8,6 +8,10 @@
 //! Everything here walks the whole mesh and may allocate: some tens of nanoseconds a patch, for
 //! debug views only.
 
+mod drawn;
+
+pub use drawn::{DrawnLeaf, DrawnMesh};
+
 use crate::datasource::pages::Pages;
 use crate::frame::Terrain;
 use crate::geodesy::trig::{cos, sin};

@@ -1,0 +1,416 @@
+//! What the ground does between the samples of a page, and around it: looked at, not guessed.
+//!
+//! In:    a page's samples, a way to ask the ground at any lattice point.
+//! Out:   [`Findings`] around any sample: residuals, range and rise of the ground within reach.
+//! Keeps: one [`Block`] for each four by four cells of the page and of the apron around it.
+//! Not here: what bounds are made of them (`generate`).
+//!
+//! Bounds from the octaves alone add up what never adds up: they are 10 to 100 times what a frame
+//! shows. So every block is probed at four inner points, the ground being asked with all of its
+//! octaves, and the largest residual in reach counts, times [`SURPRISE`] for what lies between.
+//!
+//! Reach. In sides of its square, along either axis of the unfolded octahedron, the descendants of
+//! an even diamond lie within 1/2 + 1/2 + 1/4 + 1/8 + … = 3/2 of its centre: kids on the sides of
+//! the square, their kids half as large, and so on. Those of an odd one lie within 1. The side is
+//! 2^(k/2) samples for an even diamond, twice that for an odd one.
+//!
+//! What is known about a block is the same in every page whose apron holds it: so pages that share
+//! a sample agree on its bound.
+
+use super::key::{PAGE_SIDE, PageKey};
+use super::page::{BOUND_SIDE, BOUND_STRIDE, SAMPLES};
+use crate::geodesy::narrow;
+use crate::lattice::{RADIUS, fold};
+use glam::IVec3;
+
+/// The ground strays from triangles by at most this many times what any probe within reach shows.
+///
+/// Calibrated, not proven: 36 probes at least are in reach of a diamond, and the middles of all
+/// edges. `core/tests/bounds.rs` and the measured flights hold it.
+pub const SURPRISE: f64 = 2.0;
+
+/// Probes lie on eighths of a cell.
+const PARTS: i32 = 8;
+/// Blocks along one side of a page.
+const BLOCKS: usize = BOUND_SIDE - 1;
+/// Where a block is probed: cell and eighths of it from the block's corner. Mirrored along either
+/// axis they are the same, as they must be beyond the borders of a quadrant.
+const PROBES: [((usize, usize), (i32, i32)); 4] =
+    [((0, 1), (5, 3)), ((3, 1), (3, 3)), ((0, 2), (5, 5)), ((3, 2), (3, 5))];
+
+/// What is known about one block.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    odd_m: f64,
+    even_m: f64,
+    low_m: f64,
+    high_m: f64,
+}
+
+/// What is known about the ground within reach of a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Findings {
+    /// Largest residuals of the triangles of odd and of even levels, metres.
+    pub residual_m: [f64; 2],
+    /// Least and greatest height seen, metres.
+    pub range_m: [f64; 2],
+    /// Largest range of any block, metres.
+    pub relief_m: f64,
+}
+
+/// The blocks of a page and of its apron.
+pub struct Probes {
+    reach: Reach,
+    side: usize,
+    blocks: Vec<Block>,
+}
+
+/// How far diamonds reach from the bounds around their centre, in blocks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reach {
+    /// Odd diamonds.
+    pub odd: usize,
+    /// Even diamonds.
+    pub even: usize,
+}
+
+/// What is looked at: a page and how its patches are cut.
+#[derive(Clone, Copy)]
+pub struct Site {
+    /// The page.
+    pub key: PageKey,
+    /// A leaf is 2^k triangles.
+    pub patch_depth: u8,
+}
+
+impl Reach {
+    /// In scenes of this patch depth.
+    ///
+    /// Centres of odd diamonds lie on kept bounds from k = 4 on, those of even ones from k = 6 on;
+    /// others lie between bounds, of which all four count.
+    pub fn of(patch_depth: u8) -> Self {
+        let [odd, even] = match patch_depth / 2 {
+            0 | 1 => [1, 1],
+            2 => [2, 1],
+            half => [(1 << half) / 2, 3 * (1 << half) / 8],
+        };
+        Self { odd, even }
+    }
+}
+
+impl Probes {
+    /// Looks at the ground in and around a page; `heights_m` are those of its samples, `ground_m`
+    /// is the height at any lattice point. `None` where the lattice has no points between samples.
+    pub fn new(
+        site: Site,
+        heights_m: &[f32; SAMPLES],
+        mut ground_m: impl FnMut(IVec3) -> f64,
+    ) -> Option<Self> {
+        if site.key.step() < PARTS {
+            return None;
+        }
+        let reach = Reach::of(site.patch_depth);
+        let apron = reach.odd;
+        let field = Field::new(site, apron, heights_m, &mut ground_m);
+        let side = BLOCKS + 2 * apron;
+        let places = (0..side).flat_map(|y| (0..side).map(move |x| (x, y)));
+        let blocks = places.map(|at| field.block(at, &mut ground_m)).collect();
+        Some(Self { reach, side, blocks })
+    }
+
+    /// All blocks within reach of the bound at (i, j).
+    pub fn around(&self, i: usize, j: usize) -> Findings {
+        let mut found = Findings {
+            residual_m: [0.0; 2],
+            range_m: [f64::INFINITY, f64::NEG_INFINITY],
+            relief_m: 0.0,
+        };
+        let apron = self.reach.odd;
+        for y in j..j + 2 * apron {
+            for block in &self.blocks[y * self.side + i..][..2 * apron] {
+                found.residual_m[0] = greater(found.residual_m[0], block.odd_m);
+                found.range_m[0] = -greater(-found.range_m[0], -block.low_m);
+                found.range_m[1] = greater(found.range_m[1], block.high_m);
+                found.relief_m = greater(found.relief_m, block.high_m - block.low_m);
+            }
+        }
+        let (first, count) = (apron - self.reach.even, 2 * self.reach.even);
+        for y in j + first..j + first + count {
+            for block in &self.blocks[y * self.side + i + first..][..count] {
+                found.residual_m[1] = greater(found.residual_m[1], block.even_m);
+            }
+        }
+        found
+    }
+}
+
+/// Heights of a page's samples and of those around it.
+struct Field {
+    site: Site,
+    /// Samples beyond each border.
+    apron: usize,
+    side: usize,
+    heights_m: Vec<f64>,
+}
+
+impl Field {
+    fn new(
+        site: Site,
+        blocks: usize,
+        own_m: &[f32; SAMPLES],
+        ground_m: &mut impl FnMut(IVec3) -> f64,
+    ) -> Self {
+        let apron = blocks * BOUND_STRIDE;
+        let side = PAGE_SIDE + 2 * apron;
+        let within = |at: usize| (apron..apron + PAGE_SIDE).contains(&at);
+        let mut field = Self { site, apron, side, heights_m: Vec::with_capacity(side * side) };
+        for (j, i) in (0..side).flat_map(|j| (0..side).map(move |i| (j, i))) {
+            let height_m = if within(i) && within(j) {
+                f64::from(own_m[(j - apron) * PAGE_SIDE + i - apron])
+            } else {
+                // As the page that holds it would keep it.
+                f64::from(narrow(ground_m(field.point((i, j), (0, 0)))))
+            };
+            field.heights_m.push(height_m);
+        }
+        field
+    }
+
+    fn at(&self, (i, j): (usize, usize)) -> f64 {
+        self.heights_m[j * self.side + i]
+    }
+
+    /// A block: all of its samples, the middles of its edges, its probes.
+    fn block(&self, (x, y): (usize, usize), ground_m: &mut impl FnMut(IVec3) -> f64) -> Block {
+        let mut block = Block::EMPTY;
+        let (i0, j0) = (x * BOUND_STRIDE, y * BOUND_STRIDE);
+        for j in j0..=j0 + BOUND_STRIDE {
+            for i in i0..=i0 + BOUND_STRIDE {
+                block.see(self.at((i, j)));
+            }
+        }
+        // The hypotenuses of odd triangles are the sides of squares of two by two cells.
+        for (j, i) in [0, 2, 4].into_iter().flat_map(|j| [0, 2].map(|i| (j, i))) {
+            for (a, b, c) in [((i, j), (i + 1, j), (i + 2, j)), ((j, i), (j, i + 1), (j, i + 2))] {
+                let at = |(i, j): (usize, usize)| self.at((i0 + i, j0 + j));
+                let bend_m = (at(b) - f64::midpoint(at(a), at(c))).abs();
+                block.odd_m = greater(block.odd_m, bend_m);
+                block.even_m = greater(block.even_m, HALVED * bend_m);
+            }
+        }
+        if self.site.patch_depth == 0 {
+            for (j, i) in [0, 2].into_iter().flat_map(|j| [0, 2].map(|i| (j0 + j, i0 + i))) {
+                block.even_m = greater(block.even_m, self.bend_m((i, j)));
+            }
+        }
+        for (cell, parts) in PROBES {
+            let cell = (i0 + cell.0, j0 + cell.1);
+            let seen_m = ground_m(self.point(cell, parts));
+            block.see(seen_m);
+            let [odd_m, even_m] = self.planes_m(cell, parts).map(|m| (seen_m - m).abs());
+            block.odd_m = greater(block.odd_m, odd_m);
+            block.even_m = greater(block.even_m, even_m);
+        }
+        block
+    }
+
+    /// How far the diagonal that cuts a square of two by two cells strays in its middle.
+    fn bend_m(&self, (i, j): (usize, usize)) -> f64 {
+        let [mut a, mut b] = [(0, 0), (2, 2)];
+        if self.is_anti((i, j), 2) {
+            [a, b] = [(2, 0), (0, 2)];
+        }
+        let [a, b] = [a, b].map(|(di, dj)| self.at((i + di, j + dj)));
+        (self.at((i + 1, j + 1)) - f64::midpoint(a, b)).abs()
+    }
+
+    /// Heights of the triangles of odd and of even levels at some place within a cell.
+    fn planes_m(&self, (i, j): (usize, usize), (a, b): (i32, i32)) -> [f64; 2] {
+        let share = |part: i32| f64::from(part) / f64::from(PARTS);
+        let (wide_i, wide_j) = (i / 2 * 2, j / 2 * 2);
+        let wide = ((i - wide_i) as f64 + share(a), (j - wide_j) as f64 + share(b));
+        let wide = (0.5 * wide.0, 0.5 * wide.1);
+        let square = |size: usize, (i, j): (usize, usize)| {
+            [(0, 0), (size, 0), (0, size), (size, size)].map(|(di, dj)| self.at((i + di, j + dj)))
+        };
+        let [h00, h10, h01, h11] = square(2, (wide_i, wide_j));
+        let four = [h00, h10, h01, h11, self.at((wide_i + 1, wide_j + 1))];
+        let even_m = if self.site.patch_depth == 0 {
+            // A patch is a single triangle, and its page holds the middle of its hypotenuse.
+            cut_in_two([h00, h10, h01, h11], self.is_anti((wide_i, wide_j), 2), wide)
+        } else {
+            cut_in_two(square(1, (i, j)), self.is_anti((i, j), 1), (share(a), share(b)))
+        };
+        [cut_in_four(four, wide), even_m]
+    }
+
+    /// Whether the diagonal of a square of `size` cells runs from its (1, 0) to its (0, 1).
+    fn is_anti(&self, (i, j): (usize, usize), size: usize) -> bool {
+        let (u0, v0) = self.site.key.origin();
+        let step = self.site.key.step();
+        if size == 2 && 2 * step == RADIUS || step == RADIUS {
+            return true;
+        }
+        let first = |origin: i32| (origin / step).cast_unsigned() as usize;
+        // The apron is a whole number of blocks, which does not change what is odd.
+        ((first(u0) + i) / size + (first(v0) + j) / size) % 2 == 1
+    }
+
+    /// The lattice point at a sample and some parts of a cell further on, wherever it lies.
+    fn point(&self, (i, j): (usize, usize), (a, b): (i32, i32)) -> IVec3 {
+        let (u0, v0) = self.site.key.origin();
+        let step = i64::from(self.site.key.step());
+        let along = |origin: i32, at: usize, part: i32| {
+            let at = at as i64 - self.apron as i64;
+            i64::from(origin) + at * step + step / i64::from(PARTS) * i64::from(part)
+        };
+        let (u, v) = (along(u0, i, a), along(v0, j, b));
+        let radius = i64::from(RADIUS);
+        // Beyond u = 0 and v = R the sign of x changes, beyond v = 0 and u = R that of y.
+        let flips_x = u < 0 || v > radius;
+        let flips_y = v < 0 || u > radius;
+        let within = |at: i64| {
+            let at = if at < 0 { -at } else { at };
+            let at = if at > radius { 2 * radius - at } else { at };
+            i32::try_from(at.clamp(0, radius)).expect("within the square")
+        };
+        let mut point = fold(self.site.key.quadrant(), within(u), within(v));
+        if flips_x {
+            point.x = -point.x;
+        }
+        if flips_y {
+            point.y = -point.y;
+        }
+        point
+    }
+}
+
+/// The least share of an odd triangle's bend that is expected of the even ones within it: a half
+/// on smooth ground, more at a crease.
+const HALVED: f64 = 0.7;
+
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
+
+impl Block {
+    const EMPTY: Self =
+        Self { odd_m: 0.0, even_m: 0.0, low_m: f64::INFINITY, high_m: f64::NEG_INFINITY };
+
+    fn see(&mut self, height_m: f64) {
+        self.low_m = if height_m < self.low_m { height_m } else { self.low_m };
+        self.high_m = if height_m > self.high_m { height_m } else { self.high_m };
+    }
+}
+
+/// Height of a unit square's two triangles at a place; corners are (0, 0), (1, 0), (0, 1), (1, 1).
+fn cut_in_two([h00, h10, h01, h11]: [f64; 4], anti: bool, (x, y): (f64, f64)) -> f64 {
+    match (anti, if anti { x + y < 1.0 } else { x > y }) {
+        (true, true) => h00 + x * (h10 - h00) + y * (h01 - h00),
+        (true, false) => h11 + (1.0 - x) * (h01 - h11) + (1.0 - y) * (h10 - h11),
+        (false, true) => h10 + (1.0 - x) * (h00 - h10) + y * (h11 - h10),
+        (false, false) => h01 + x * (h11 - h01) + (1.0 - y) * (h00 - h01),
+    }
+}
+
+/// Height of a unit square's four triangles around its centre, the fifth height.
+fn cut_in_four([h00, h10, h01, h11, centre]: [f64; 5], (x, y): (f64, f64)) -> f64 {
+    // The weight of the centre is twice the distance from the nearest side.
+    let (to_side, a, b, along) = match (y <= x, y <= 1.0 - x) {
+        (true, true) => (y, h00, h10, x),
+        (true, false) => (1.0 - x, h10, h11, y),
+        (false, false) => (1.0 - y, h01, h11, x),
+        (false, true) => (x, h00, h01, y),
+    };
+    centre * (2.0 * to_side) + a * (1.0 - along - to_side) + b * (along - to_side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_cuts_meet_their_corners_and_planes() {
+        let plane = |x: f64, y: f64| 3.0 + 2.0 * x - 5.0 * y;
+        let corners = [plane(0.0, 0.0), plane(1.0, 0.0), plane(0.0, 1.0), plane(1.0, 1.0)];
+        let [a, b, c, d] = corners;
+        for (x, y) in [(0.1, 0.2), (0.9, 0.3), (0.6, 0.95), (0.05, 0.7), (0.5, 0.5)] {
+            for anti in [false, true] {
+                assert!((cut_in_two(corners, anti, (x, y)) - plane(x, y)).abs() < 1e-12);
+            }
+            let four = cut_in_four([a, b, c, d, plane(0.5, 0.5)], (x, y));
+            assert!((four - plane(x, y)).abs() < 1e-12);
+        }
+        let bent = [0.0, 1.0, 1.0, 0.0];
+        assert_eq!(cut_in_two(bent, true, (0.5, 0.5)), 1.0);
+        assert_eq!(cut_in_two(bent, false, (0.5, 0.5)), 0.0);
+        assert_eq!(cut_in_four([0.0, 0.0, 0.0, 0.0, 8.0], (0.5, 0.25)), 4.0);
+    }
+
+    #[test]
+    fn residuals_of_a_plane_are_nothing_and_those_of_a_bowl_follow_the_cell() {
+        let key = PageKey::new(1, 9, 300, 77);
+        let (u0, v0) = key.origin();
+        let at = |point: IVec3| {
+            let (u, v) = crate::lattice::unfold(1, point);
+            (f64::from(u - u0) / f64::from(key.step()), f64::from(v - v0) / f64::from(key.step()))
+        };
+        for bowl in [0.0, 0.5] {
+            let ground_m = |point: IVec3| {
+                let (i, j) = at(point);
+                7.0 + 0.25 * i - j + bowl * (i * i + j * j)
+            };
+            let mut heights_m = [0.0_f32; SAMPLES];
+            for (j, i) in (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (j, i))) {
+                heights_m[j * PAGE_SIDE + i] = crate::geodesy::narrow(ground_m(key.sample(i, j)));
+            }
+            let site = Site { key, patch_depth: 4 };
+            let found = Probes::new(site, &heights_m, ground_m).unwrap().around(8, 8);
+            // Half a cell away from both ends the bowl lies a quarter of its strength lower.
+            let [odd_m, even_m] = found.residual_m;
+            assert!(even_m <= 0.5 * bowl + 1e-3 && odd_m <= bowl + 1e-3, "{found:?}");
+            assert!(even_m >= 0.3 * bowl && odd_m >= 0.6 * bowl, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn the_apron_goes_on_beyond_the_borders_of_a_quadrant() {
+        let heights_m = [0.0_f32; SAMPLES];
+        for (x, y) in [(0, 0), (15, 0), (0, 15), (15, 15)] {
+            let site = Site { key: PageKey::new(0, 4, x, y), patch_depth: 4 };
+            let field = Field::new(site, 2, &heights_m, &mut |_| 0.0);
+            for at in [(0, 0), (5, 40), (40, 5), (80, 28), (28, 80), (80, 80)] {
+                let point = field.point(at, (3, 5));
+                assert_eq!(point.abs().element_sum(), RADIUS, "{point}");
+            }
+            let [inner, outer] =
+                [8, 7].map(|i| crate::lattice::normal_of(field.point((i, 28), (0, 0))));
+            let step = f64::from(site.key.step()) / f64::from(RADIUS);
+            assert!((inner - outer).length() < 4.0 * step, "{:?}", site.key);
+        }
+    }
+
+    #[test]
+    fn pages_that_share_a_sample_find_the_same_around_it() {
+        let ground_m = |point: IVec3| {
+            let p = point.as_dvec3() / f64::from(RADIUS) * 3e4;
+            1e3 * (p.x * 1.7 + (p.y * 0.9).fract() + 0.3 * p.z * (p.x * 1.1).fract())
+        };
+        let findings = |key: PageKey, i: usize, j: usize| {
+            let mut heights_m = [0.0_f32; SAMPLES];
+            for (j, i) in (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (j, i))) {
+                heights_m[j * PAGE_SIDE + i] = narrow(ground_m(key.sample(i, j)));
+            }
+            let found = Probes::new(Site { key, patch_depth: 4 }, &heights_m, ground_m).unwrap();
+            let Findings { residual_m, range_m, relief_m } = found.around(i, j);
+            [residual_m[0], residual_m[1], range_m[0], range_m[1], relief_m]
+        };
+        let own = |x, y| PageKey::new(0, 7, x, y);
+        for j in [0, 5, 16] {
+            // Within a quadrant, and across x = 0 into the next.
+            assert_eq!(findings(own(30, 9), 16, j), findings(own(31, 9), 0, j));
+            assert_eq!(findings(own(0, 9), 0, j), findings(PageKey::new(1, 7, 0, 9), 0, j));
+            assert_eq!(findings(own(40, 127), j, 16), findings(PageKey::new(1, 7, 40, 127), j, 16));
+        }
+    }
+}

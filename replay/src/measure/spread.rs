@@ -1,0 +1,141 @@
+//! How a measured quantity is spread, and where it is greatest.
+//!
+//! In:    values of frames, with where each was seen.
+//! Out:   rms, p50, p95, p99, p99.9, max and its place; of a frame, and of a whole flight.
+//! Keeps: a histogram of the flight: 1/32 of an octave a bin.
+//! Not here: what is measured.
+
+/// Where a value was seen.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Where {
+    /// Frame of the flight.
+    pub frame: u64,
+    /// Geodetic latitude, degrees.
+    pub lat_deg: f64,
+    /// Longitude, degrees.
+    pub lon_deg: f64,
+    /// Pixel from the left and from the top.
+    pub pixel: [f64; 2],
+}
+
+/// A spread in numbers.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Spread {
+    /// How many values.
+    pub count: u64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Median.
+    pub p50: f64,
+    /// Exceeded by 5 % of the values.
+    pub p95: f64,
+    /// Exceeded by 1 %.
+    pub p99: f64,
+    /// Exceeded by one in a thousand.
+    pub p999: f64,
+    /// The greatest value.
+    pub max: f64,
+    /// Where that was seen.
+    pub at: Where,
+}
+
+/// Bins an octave.
+const BINS: usize = 32;
+/// Values from 2⁻⁶⁰ to 2⁶⁰; smaller ones share the lowest bin, greater ones the highest.
+const OCTAVES: i32 = 60;
+
+/// Values of a whole flight. Percentiles are upper ends of bins: at most 1/32 of an octave, 2.2 %,
+/// too large, never too small; max and rms are exact.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Gathered {
+    bins: Vec<u64>,
+    count: u64,
+    squares: f64,
+    max: f64,
+    at: Where,
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        let bins = vec![0; 2 * OCTAVES.unsigned_abs() as usize * BINS + 1];
+        Self { bins, count: 0, squares: 0.0, max: 0.0, at: Where::default() }
+    }
+}
+
+impl Spread {
+    /// Of the values of one frame, exact by nearest rank; reorders them. `at` tells where the
+    /// value of an index was seen, before reordering. Values are not negative and not NaN.
+    pub fn of(values: &mut [f64], at: impl FnOnce(usize) -> Where) -> Self {
+        let greatest = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
+        let Some(greatest) = greatest else { return Self::default() };
+        let at = at(greatest);
+        let rms = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+        values.sort_unstable_by(f64::total_cmp);
+        let rank = |permille: usize| values[(values.len() * permille).div_ceil(1000).max(1) - 1];
+        Self {
+            count: values.len() as u64,
+            rms,
+            p50: rank(500),
+            p95: rank(950),
+            p99: rank(990),
+            p999: rank(999),
+            max: rank(1000),
+            at,
+        }
+    }
+}
+
+impl Gathered {
+    /// Adds the values of a frame and its spread.
+    pub fn add(&mut self, values: &[f64], spread: &Spread) {
+        for &value in values {
+            self.bins[bin_of(value)] += 1;
+            self.squares += value * value;
+        }
+        self.count += values.len() as u64;
+        if spread.max > self.max || self.count == values.len() as u64 {
+            (self.max, self.at) = (spread.max, spread.at);
+        }
+    }
+
+    /// The spread of all of it.
+    pub fn spread(&self) -> Spread {
+        if self.count == 0 {
+            return Spread::default();
+        }
+        let rank = |permille: u64| {
+            let rank = (self.count * permille).div_ceil(1000).max(1);
+            let mut passed = 0;
+            let bin = self.bins.iter().position(|&count| {
+                passed += count;
+                passed >= rank
+            });
+            bin.map_or(self.max, upper_end).min(self.max)
+        };
+        Spread {
+            count: self.count,
+            rms: (self.squares / self.count as f64).sqrt(),
+            p50: rank(500),
+            p95: rank(950),
+            p99: rank(990),
+            p999: rank(999),
+            max: self.max,
+            at: self.at,
+        }
+    }
+}
+
+fn bin_of(value: f64) -> usize {
+    if value <= 0.0 {
+        return 0;
+    }
+    let place = (libm::log2(value) + f64::from(OCTAVES)) * BINS as f64;
+    let last = 2 * OCTAVES.unsigned_abs() as usize * BINS;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let bin = place.ceil().clamp(0.0, last as f64) as usize;
+    bin
+}
+
+fn upper_end(bin: usize) -> f64 {
+    if bin == 0 { 0.0 } else { libm::exp2(bin as f64 / BINS as f64 - f64::from(OCTAVES)) }
+}

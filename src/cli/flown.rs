@@ -1,0 +1,120 @@
+//! A flight flown frame by frame for those who look at each frame: no pictures, no recording.
+//!
+//! In:    a flight or recording, a scene, workers, a delay of the loader.
+//! Out:   the terrain after each frame, and the frame's output.
+//! Keeps: [`Flown`].
+//! Not here: `replay` with all that it keeps (`run`), what is made of the frames.
+
+use super::Failure;
+use super::source::Source;
+use overfly::Overfly;
+use overfly::core::datasource::PageKey;
+use overfly::core::frame::{FrameInput, FrameOutput};
+use overfly::core::settings::SceneSettings;
+use overfly::loader::Loader;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most frames in which the terrain comes up before a flight.
+const LEAD_IN_MAX: usize = 2000;
+
+/// A scene and the flight that is flown over it.
+pub struct Flown {
+    /// The scene with everything that it needs to run.
+    pub overfly: Overfly,
+    /// What is flown.
+    pub source: Source,
+    /// The last frame's.
+    pub output: FrameOutput,
+    scene: SceneSettings,
+    input: FrameInput,
+    loader: Loader,
+    size_px: [u32; 2],
+    /// Frames that a page takes beyond the next, and those on their way with when they are due.
+    delay: usize,
+    coming: VecDeque<(usize, PageKey)>,
+    count: usize,
+}
+
+/// How a flight is flown.
+#[derive(Clone, Copy)]
+pub struct Manner {
+    /// Worker threads beside the caller.
+    pub workers: usize,
+    /// Size of the picture that errors are counted in.
+    pub size_px: [u32; 2],
+    /// How much later than in the next frame pages arrive, in seconds of the flight.
+    pub delay_s: f64,
+}
+
+impl Flown {
+    /// Opens a flight over a scene.
+    pub fn open(name: &str, scene: &SceneSettings, manner: Manner) -> Result<Self, Failure> {
+        let overfly = Overfly::new(scene, manner.workers)?;
+        let source = Source::open(name, scene, &overfly)?;
+        let loader = overfly.loader(super::replay::default_workers().max(1))?;
+        let rate_hz = source.rate_hz();
+        let delay = (0..).find(|&frames| f64::from(frames) >= manner.delay_s * rate_hz);
+        Ok(Self {
+            overfly,
+            size_px: source.size_px().unwrap_or(manner.size_px),
+            source,
+            output: FrameOutput::default(),
+            scene: scene.clone(),
+            input: FrameInput::default(),
+            loader,
+            delay: usize::try_from(delay.unwrap_or(0_u32))?,
+            coming: VecDeque::new(),
+            count: 0,
+        })
+    }
+
+    /// Holds the clock before frame `first` until the terrain has come up. False if it was stopped.
+    pub fn lead_in(&mut self, first: usize, stop: &AtomicBool) -> Result<bool, Failure> {
+        let recorded = self.source.lead_in();
+        let is_recording = matches!(self.source, Source::Recording(_));
+        for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            self.run(if is_recording { index } else { first }, !is_recording)?;
+            let c = &self.output.counts;
+            let idle = c.splits + c.merges + c.wanted == 0;
+            if !is_recording && c.leaves > 0 && idle && self.coming.is_empty() {
+                break;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Runs one frame.
+    pub fn frame(&mut self, index: usize) -> Result<(), Failure> {
+        self.run(index + self.source.lead_in(), false)
+    }
+
+    fn run(&mut self, played: usize, held: bool) -> Result<(), Failure> {
+        self.source.fill(played, &self.scene, self.size_px, &mut self.input);
+        if held {
+            self.input.time_s -= 1.0 / self.source.rate_hz();
+        }
+        let arriving = self.arriving(played);
+        self.loader.fetch(&arriving, &mut self.input.arrived);
+        self.overfly.frame(&mut self.input, &mut self.output)?;
+        Ok(())
+    }
+
+    /// The pages of this frame: as recorded; else what was wanted and is due.
+    fn arriving(&mut self, played: usize) -> Vec<PageKey> {
+        if let Some(keys) = self.source.arrived(played) {
+            return keys.to_vec();
+        }
+        for &key in &self.output.wanted {
+            if self.coming.iter().all(|&(_, known)| known != key) {
+                self.coming.push_back((self.count + self.delay, key));
+            }
+        }
+        let due = self.coming.iter().take_while(|&&(due, _)| due <= self.count).count();
+        self.count += 1;
+        self.coming.drain(..due).map(|(_, key)| key).collect()
+    }
+}
