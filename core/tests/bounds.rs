@@ -69,6 +69,7 @@ fn no_triangle_is_farther_from_the_ground_than_its_bound() {
     for ((style, sea), patch_depth) in kinds.into_iter().flat_map(|kind| [(kind, 0), (kind, 4)]) {
         let mut settings = scene(patch_depth, 60_000);
         settings.sea = sea;
+        settings.lod.tolerance.0 = 0.1;
         let (seed, relief, finest_m, detail) = (2029, 1.0, 0.2, 1.0);
         settings.sources =
             vec![SourceSettings::Procedural { seed, style, relief, finest_m, detail }];

@@ -110,7 +110,7 @@ fn rays_meet_ground_of_mixed_levels_and_its_steps() {
     let fine = pages_of(&generator, disc(centre, 2_500.0), 34);
     pages.extend(fine.into_iter().filter(|page| page.key.depth() > 7));
     let ground = ground_of(&pages, false);
-    for query in [Query::BestResident, Query::Within(Metres(300.0)), Query::Within(Metres(150.0))] {
+    for query in [Query::BestResident, Query::Within(Metres(30.0)), Query::Within(Metres(10.0))] {
         let (hits, worst_m, levels) = compare(&ground, disc(centre, 6_000.0), query, 300);
         println!("{query:?}: {hits} hits, levels {levels:b}, {worst_m:e} m apart at most");
         assert!(levels.count_ones() > 1, "{levels:b}");

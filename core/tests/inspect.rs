@@ -53,13 +53,13 @@ fn worst_px(infos: &[PatchInfo]) -> f32 {
 #[test]
 fn where_the_tolerance_decides_no_patch_is_worse() {
     let mut settings = scene(4, 1_000_000);
-    settings.lod.tolerance.0 = 40.0;
+    settings.lod.tolerance.0 = 4.0;
     let mut rig = Rig::new(&settings, 0);
     rig.settle(&[over(46.8, 30_000.0)]);
     rig.settle(&[over(46.8, 90_000.0)]);
-    assert_eq!(rig.output.counts.error_px_bound, 40.0);
+    assert_eq!(rig.output.counts.error_px_bound, 4.0);
     let infos = of_leaves(&rig);
-    assert!(worst_px(&infos) <= 40.0 && worst_px(&infos) > 20.0);
+    assert!(worst_px(&infos) <= 4.0 && worst_px(&infos) > 2.0);
     let seen = infos.iter().filter(|info| info.seen == 1).count();
     assert!(seen > 10 && seen < infos.len(), "{seen} of {}", infos.len());
     assert!(infos.iter().all(|info| info.lacking == 0));
@@ -176,10 +176,10 @@ fn diamonds_point_at_their_parents_on_the_ground() {
         assert!((there.height_m - ground_m).abs() < 2e-3, "{} and {ground_m}", there.height_m);
     }
     let all = lines.clone();
-    rig.terrain.diamond_lines(near, 15_000.0, usize::MAX, &mut lines);
+    rig.terrain.diamond_lines(near, 40_000.0, usize::MAX, &mut lines);
     assert!(!lines.is_empty() && lines.len() < all.len());
-    assert!(lines.iter().all(|[from, _]| (*from - near).length() <= 15_000.0));
+    assert!(lines.iter().all(|[from, _]| (*from - near).length() <= 40_000.0));
     let nearest: Vec<_> = lines[..5].to_vec();
-    rig.terrain.diamond_lines(near, 15_000.0, 5, &mut lines);
+    rig.terrain.diamond_lines(near, 40_000.0, 5, &mut lines);
     assert!(lines.len() >= 4 && nearest.starts_with(&lines));
 }

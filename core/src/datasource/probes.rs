@@ -368,7 +368,7 @@ mod tests {
             let found = Probes::new(site, &heights_m, ground_m).unwrap().around(8, 8);
             // Half a cell away from both ends the bowl lies a quarter of its strength lower.
             let [odd_m, even_m] = found.residual_m;
-            assert!(even_m <= 0.5 * bowl + 1e-3 && odd_m <= bowl + 1e-3, "{found:?}");
+            assert!(even_m <= HALVED * bowl + 1e-3 && odd_m <= bowl + 1e-3, "{found:?}");
             assert!(even_m >= 0.3 * bowl && odd_m >= 0.6 * bowl, "{found:?}");
         }
     }

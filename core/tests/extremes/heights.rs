@@ -149,11 +149,13 @@ fn split(world: &World) -> BTreeSet<[i32; 3]> {
 
 /// What is refined for its error is the same. Two margins are wider where ground is far above the
 /// ellipsoid: the range of heights takes 0 in, so that more of the far side might be seen, and the
-/// picture's edges count the height. So the raised body has all that the larger one has, and more.
+/// picture's edges count the height. One is narrower: a cap of normals spreads the radius by one
+/// hundredth more than it spreads the height. So the raised body has nearly all that the larger one
+/// has, and more.
 #[test]
 fn case_24_a_body_raised_by_1e5_m_has_the_mesh_of_a_larger_one_and_wider_margins() {
     let (low, high) = (sphere(RADIUS_M), sphere(RADIUS_M + 1e5));
-    for (eye_m, pitch_deg, share_most) in [(3e7, -90.0, 1.05), (3e4, -20.0, 1.8)] {
+    for (eye_m, pitch_deg, share_most) in [(3e7, -90.0, 1.08), (3e4, -20.0, 1.8)] {
         let world = |body, height_m: f64| {
             let mut settings = bare(body, 4, 400_000);
             settings.lod.tolerance.0 = 0.1;
@@ -166,7 +168,8 @@ fn case_24_a_body_raised_by_1e5_m_has_the_mesh_of_a_larger_one_and_wider_margins
         assert_eq!(raised.output.counts.error_px_bound, larger.output.counts.error_px_bound);
         let (raised, larger) = (split(&raised), split(&larger));
         println!("{} and {} split", raised.len(), larger.len());
-        assert!(larger.len() > 300 && raised.is_superset(&larger), "{}", larger.len());
+        let lacks = larger.difference(&raised).count();
+        assert!(larger.len() > 300 && lacks * 50 <= larger.len(), "{lacks} of {}", larger.len());
         assert!(raised.len() as f64 <= share_most * larger.len() as f64, "{}", raised.len());
     }
 }
@@ -208,8 +211,10 @@ fn case_25_a_needle_appears_where_its_bound_says_and_is_never_missed() {
         settings.lod.tolerance.0 = tolerance_px;
         let mut world = World::synthetic(&settings, needle(height_m));
         let camera = Camera::new(&towards(&world, 3e4), &body);
-        let far_m = 1e3 * camera.pixels_per_radian * camera.corner_factor / tolerance_px;
-        for (share, shows) in [(1.6, false), (1.1, false), (0.95, true), (0.5, true), (0.1, true)] {
+        // The needle is in the middle of the picture; its region may reach the corner.
+        let far_m = 1e3 * camera.pixels_per_radian / tolerance_px;
+        let corner = 1.05 * camera.corner_factor;
+        for (share, shows) in [(1.5 * corner, false), (corner, false), (0.95, true), (0.24, true)] {
             world.settled(&[towards(&world, far_m * share)]);
             let drawn_m = peak_m(&world, if height_m > 0.0 { 1.0 } else { -1.0 });
             let expected = if shows { drawn_m == 1e3 } else { drawn_m == 0.0 };

@@ -52,6 +52,7 @@ fn case_10_a_hundred_km_a_frame_to_the_antipode_and_back_leaves_the_mesh_of_a_co
 fn case_11_a_thousand_teleports_fill_no_queue_beyond_its_end() {
     let body = sphere(6.4e6);
     let mut settings = bare(body, 2, 8_000);
+    settings.lod.tolerance.0 = 2.0;
     (settings.lod.splits_max, settings.lod.merges_max, settings.lod.wanted_max) = (60, 60, 4);
     settings.memory.pages_bytes = 60 * size_of::<overfly_core::datasource::Page>() as u64;
     let mut world = World::synthetic(&settings, Relief::Noise { most_m: 300.0 });

@@ -26,7 +26,7 @@ pub fn scene(patch_depth: u8, triangles_max: u32) -> SceneSettings {
             detail: 1.0,
         }],
         lod: LodSettings {
-            tolerance: Pixels(2.0),
+            tolerance: Pixels(0.2),
             triangles_max,
             patch_depth,
             splits_max: 400,

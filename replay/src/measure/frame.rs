@@ -9,6 +9,7 @@
 //! meets the vertical of n at m; the error is the distance of the pixels of m and x. P1, the pop:
 //! the distance of the pixels of m now and m in the frame before, both as seen now.
 
+use super::errors::{FlightErrors, FrameErrors};
 use super::mesh::MeshThen;
 use super::raster::Raster;
 use super::rays::Grid;
@@ -40,61 +41,6 @@ impl Default for MeasureSettings {
     fn default() -> Self {
         Self { rays: 100_000, seed: 1, cell_px: 1.0, threads: 1 }
     }
-}
-
-/// The errors of one frame.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub struct FrameErrors {
-    /// Frame of the flight.
-    pub frame: u64,
-    /// Place of the eye, degrees and metres above the ellipsoid.
-    pub eye: [f64; 3],
-    /// Height of the eye above the mesh beneath it, metres.
-    pub above_m: f64,
-    /// Rays, and those that met the ground.
-    pub rays: u64,
-    /// E1: radial pixel error.
-    pub e1_px: Spread,
-    /// E2: difference of the depths of mesh and ground along a ray over the ground's.
-    pub e2_share: Spread,
-    /// E3: rays that meet one of ground and mesh and miss the other.
-    pub e3_rays: u64,
-    /// What the LOD promised.
-    pub bound_px: f64,
-    /// P1: pops of what is visible, since the frame before.
-    pub p1_px: Spread,
-    /// C4 and holes: rays that meet the ground well below the horizon and no mesh.
-    pub holes: u64,
-    /// C5: single rays that see through the mesh to what lies farther.
-    pub pinholes: u64,
-    /// Normals of visible ground above which the mesh has no leaf at all.
-    pub lost: u64,
-    /// T1: triangles whose greatest depth is more than ten times their least.
-    pub stretched: u64,
-    /// Triangles in the picture.
-    pub triangles: u64,
-    /// Pages of the reference that could not be made.
-    pub missing_pages: u64,
-}
-
-impl FrameErrors {
-    /// E5: the greatest measured error over what was promised.
-    pub fn e5(&self) -> f64 {
-        self.e1_px.max / self.bound_px
-    }
-}
-
-/// The errors of a flight: what was gathered from all measured frames.
-#[derive(Clone, Debug, Default)]
-pub struct FlightErrors {
-    /// Every measured frame.
-    pub frames: Vec<FrameErrors>,
-    /// E1 of all rays.
-    pub e1_px: Gathered,
-    /// E2 of all rays.
-    pub e2_share: Gathered,
-    /// P1 of all rays.
-    pub p1_px: Gathered,
 }
 
 /// What one ray found.

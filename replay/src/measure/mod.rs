@@ -6,6 +6,7 @@
 //! | [`plate`], [`reference`](mod@reference) | the ground itself, as fine as the picture can show |
 //! | [`mesh`], [`raster`] | the drawn mesh along verticals, and along rays of the eye |
 //! | [`frame`] | E1, E2, E3, E5, pops, holes of one frame |
+//! | [`errors`], [`report`] | what was measured; its names, units and verdict |
 //! | [`spread`] | percentiles, and where the worst was |
 //!
 //! In:    a terrain after each frame, pages of any depth.
@@ -14,15 +15,18 @@
 //! Not here: flying (the host), tables and pictures (the host).
 //! Source: definitions of R. Ulrich's and Duchaineau's metrics as the design notes give them.
 
+pub mod errors;
 pub mod frame;
 pub mod mesh;
 pub mod plate;
 pub mod raster;
 pub mod rays;
 pub mod reference;
+pub mod report;
 pub mod screen;
 pub mod spread;
 
-pub use frame::{FlightErrors, FrameErrors, Measure, MeasureSettings};
+pub use errors::{FlightErrors, FrameErrors, Thorough};
+pub use frame::{Measure, MeasureSettings};
 pub use reference::MakePage;
 pub use spread::{Gathered, Spread, Where};

@@ -85,6 +85,25 @@ impl Spread {
     }
 }
 
+impl Spread {
+    /// Of values that others are spread over: count, rms, max and its place are exact, percentiles
+    /// are NaN. With no value in it everything is NaN but the count.
+    pub fn merged<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
+        let mut all = Self { max: f64::NAN, ..Self::default() };
+        let mut squares = 0.0;
+        for part in parts.filter(|part| part.count > 0) {
+            all.count += part.count;
+            squares += part.rms * part.rms * part.count as f64;
+            if all.max.is_nan() || part.max > all.max {
+                (all.max, all.at) = (part.max, part.at);
+            }
+        }
+        let nan = f64::NAN;
+        let rms = (squares / all.count as f64).sqrt();
+        Self { rms, p50: nan, p95: nan, p99: nan, p999: nan, ..all }
+    }
+}
+
 impl Gathered {
     /// Adds the values of a frame and its spread.
     pub fn add(&mut self, values: &[f64], spread: &Spread) {
