@@ -15,12 +15,16 @@ mod node;
 mod scan;
 mod scene;
 mod sun;
+mod sweep;
 mod tree;
 mod utc;
+mod write;
 
 pub use fault::{Fault, FaultKind, LoadError, SceneFaults};
 pub use overfly_core::settings::SceneSettings;
+pub use sweep::{SweepSettings, read_sweep};
 pub use utc::{utc_seconds, utc_text};
+pub use write::{WriteFault, write};
 
 use fields::Reader;
 use overfly_core::settings::{SourceSettings, is_address};

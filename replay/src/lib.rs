@@ -8,6 +8,7 @@
 //! | [`flight`](mod@flight) | flights in memory, and the three that come with overfly |
 //! | [`resample`] | flights from CSV files of a flight simulator |
 //! | [`measure`](mod@measure) | errors of what is drawn, in pixels and metres |
+//! | [`trade`] | the price of every knob: points, fronts, slopes, advice |
 //! | [`compare`], [`stats`] | which stage differs first; percentiles of columns |
 //!
 //! In:    poses, frames, digests; files.
@@ -25,6 +26,7 @@ pub mod pose;
 pub mod read;
 pub mod resample;
 pub mod stats;
+pub mod trade;
 mod words;
 pub mod write;
 

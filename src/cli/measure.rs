@@ -110,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
                 measure.reference.plates()
             );
         } else if (index + 1 - frames.start).is_multiple_of(arguments.every) {
-            measure.note(terrain, output);
+            measure.take(terrain, output);
         } else {
             measure.cut();
         }

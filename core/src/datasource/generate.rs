@@ -10,7 +10,7 @@ use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, ho
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
 use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
-use super::probes::{Findings, Probes, SURPRISE, Site};
+use super::probes::{Findings, Probes, Site, surprise};
 use super::procedural::detail::Detail;
 use super::procedural::{Planet, Style};
 use super::tile::Tile;
@@ -201,7 +201,7 @@ impl Generator {
     /// The bound that follows from what was seen within reach.
     fn seen_bound(&self, found: &Findings, height_m: f64, sagitta_m: [f64; 2]) -> Bound {
         let [low_m, high_m] = found.range_m;
-        let residual_m = found.residual_m.map(|residual_m| SURPRISE * residual_m);
+        let residual_m = found.residual_m.map(|residual_m| surprise(self.bed.style) * residual_m);
         // Between probes the ground may rise by another block's relief.
         let doubt_m = found.relief_m + residual_m[0];
         let (low_m, high_m) = (low_m - doubt_m, high_m + doubt_m);

@@ -19,6 +19,10 @@ use glam::IVec3;
 pub const EXTENT_EVEN: f64 = 1.01 * 2.639_1;
 /// Reach of an odd diamond's descendants from its centre.
 pub const EXTENT_ODD: f64 = 1.01 * 1.931_9;
+/// Reach of an even diamond's own two triangles from its centre: half a steep diagonal.
+pub const OWN_EVEN: f64 = 1.01 * 1.224_8;
+/// Reach of an odd diamond's own two triangles from its centre: half a step along an axis.
+pub const OWN_ODD: f64 = 1.01 * 0.707_2;
 /// Longest edge of one steep diagonal of a sample cell: √6 steps.
 pub const DIAGONAL: f64 = 2.449_5;
 
@@ -37,8 +41,17 @@ pub const NORM_MIN: f64 = RADIUS as f64 / 1.732_050_807_568_877_3;
 ///
 /// Nested: a kid's cap lies within each of its parents' caps.
 pub fn cap_of(level: u8, centre: IVec3) -> f64 {
+    cap(level, centre, [EXTENT_EVEN, EXTENT_ODD])
+}
+
+/// Chord on the unit sphere from the diamond's normal to the farthest normal of its two triangles.
+pub fn own_cap_of(level: u8, centre: IVec3) -> f64 {
+    cap(level, centre, [OWN_EVEN, OWN_ODD])
+}
+
+fn cap(level: u8, centre: IVec3, [even, odd]: [f64; 2]) -> f64 {
     let side = f64::from(RADIUS >> (level / 2));
-    let extent = side * if level.is_multiple_of(2) { EXTENT_EVEN } else { EXTENT_ODD };
+    let extent = side * if level.is_multiple_of(2) { even } else { odd };
     let norm = centre.as_dvec3().length() - extent;
     extent / if norm > NORM_MIN { norm } else { NORM_MIN }
 }

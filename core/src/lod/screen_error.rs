@@ -12,7 +12,9 @@
 //! Horizon. A ball of the greatest radius of curvature contains it, so from height h nothing of
 //! height k is seen farther than the sum of both tangent lengths to that ball, lowered to the
 //! deepest ground. Frustum. A plane's greatest value over the region is bounded term by term.
-//! Each bound only tightens when cap and height interval shrink: so priorities are nested.
+//! Each bound only tightens when cap and height interval shrink. A diamond's own error counts from
+//! where its own triangles may be, the lesser one of its descendants from where they may be: a
+//! kid's own error is at most its parents' lesser one, so priorities are nested.
 //!
 //! Lens. Errors are vertical. At depth z and tangents t of the picture, a vertical error e is
 //! |n⊥ − t·n_f|·e·f/z large, with the normal's parts across and along the view direction: at most
@@ -58,8 +60,12 @@ pub struct Region {
     pub low_m: f64,
     /// Greatest height of the ground in the region, metres.
     pub high_m: f64,
+    /// Chord from `normal` to the farthest normal of the diamond's own two triangles.
+    pub own_cap: f64,
     /// Bound on the height error of drawing the diamond unsplit, metres.
     pub error_m: f64,
+    /// Bound on that of drawing any of its descendants, metres; at most `error_m`.
+    pub finer_m: f64,
     /// Length of the tangent from `high_m` down to the deepest ground, metres.
     pub tangent_m: f64,
 }
@@ -173,7 +179,17 @@ impl Sight {
 
     /// Lower bound on the distance from the eye to the ground of the region, metres.
     pub fn distance_m(&self, region: &Region) -> f64 {
-        let chord = (self.normal - region.normal).length() - region.cap;
+        self.distances_m(region)[1]
+    }
+
+    /// Lower bounds on the distance to the diamond's own triangles and to all of its region.
+    fn distances_m(&self, region: &Region) -> [f64; 2] {
+        let chord = (self.normal - region.normal).length();
+        [region.own_cap, region.cap].map(|cap| self.distance_beyond_m(region, chord - cap))
+    }
+
+    /// Lower bound on the distance to ground of the region whose normal is a chord away.
+    fn distance_beyond_m(&self, region: &Region, chord: f64) -> f64 {
         let chord = if chord > 0.0 { chord } else { 0.0 };
         let above = self.height_m - region.high_m;
         let below = region.low_m - self.height_m;
@@ -213,9 +229,13 @@ impl Sight {
 
     /// What this view sees of a region.
     fn look(&self, region: &Region) -> Look {
-        let distance_m = self.distance_m(region);
-        let nearest_m = if distance_m > self.near_m { distance_m } else { self.near_m };
-        Look { distance_m, nearest_m, flat_px: region.error_m * self.pixels_per_radian / nearest_m }
+        let [own_m, distance_m] = self.distances_m(region);
+        let nearest =
+            |distance_m: f64| if distance_m > self.near_m { distance_m } else { self.near_m };
+        let (own_m, all_m) = (nearest(own_m), nearest(distance_m));
+        let (own, all) = (region.error_m / own_m, region.finer_m / all_m);
+        let flat_px = if own > all { own } else { all } * self.pixels_per_radian;
+        Look { distance_m, own_m, all_m, flat_px }
     }
 
     /// How the screen's plane enlarges errors of the region.
@@ -294,16 +314,17 @@ impl Sight {
     /// For how long a leaf stays below `threshold_px` in this view, or its error.
     fn leaf(&self, region: &Region, threshold_px: f64) -> Verdict {
         let look = self.look(region);
-        let reach_m = region.error_m * self.pixels_per_radian / threshold_px;
-        let scale_m = look.nearest_m;
+        let [own_m, all_m] = self.reaches_m(region, threshold_px);
+        let scale_m = look.own_m;
+        let slack = |shrink: f64| (look.own_m * shrink - own_m).min(look.all_m * shrink - all_m);
         if look.flat_px < threshold_px * self.corner_cosine2 {
-            let slack_m = look.nearest_m - reach_m / self.corner_cosine2;
+            let slack_m = slack(self.corner_cosine2) / self.corner_cosine2;
             let slack_m = self.path_of(region, slack_m, scale_m);
             return Verdict::Certain(Lasts { family: Family::Far, scale_m, slack_m });
         }
         let seen_by_m = self.seen_by_m(region, &look);
         if seen_by_m < 0.0 {
-            let scale_m = self.farthest_m(region).max(look.nearest_m);
+            let scale_m = self.farthest_m(region).max(scale_m);
             let slack_m = self.path_of(region, -seen_by_m, scale_m);
             return Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m });
         }
@@ -312,7 +333,7 @@ impl Sight {
         if error_px >= threshold_px {
             return Verdict::Urgent(error_px);
         }
-        let slack_m = look.nearest_m * lens.shrink - reach_m - 1e-9 * lens.far_m - 1e-6;
+        let slack_m = slack(lens.shrink) - 1e-9 * lens.far_m - 1e-6;
         let strength = lens.strength();
         let path = self.stretch(region) + 2.0 + 2.0 * self.stretch_far(region);
         let turn = (2.0 + strength * (1.0 + self.corner_tangent)) / path;
@@ -323,6 +344,12 @@ impl Sight {
         Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m })
     }
 
+    /// Distances at which the own error and that of all descendants are on a threshold.
+    fn reaches_m(&self, region: &Region, threshold_px: f64) -> [f64; 2] {
+        [region.error_m, region.finer_m]
+            .map(|error_m| error_m * self.pixels_per_radian / threshold_px)
+    }
+
     /// For how long a parent stays above `threshold_px` in this view, or its error.
     fn parent(&self, region: &Region, threshold_px: f64) -> Verdict {
         let look = self.look(region);
@@ -330,12 +357,12 @@ impl Sight {
         if seen_by_m < 0.0 {
             return Verdict::Urgent(0.0);
         }
-        let reach_m = region.error_m * self.pixels_per_radian / threshold_px;
+        let [own_m, all_m] = self.reaches_m(region, threshold_px);
+        let slack = |shrink: f64| (own_m - look.own_m * shrink).max(all_m - look.all_m * shrink);
         let farthest_m = self.farthest_m(region);
         if look.flat_px > threshold_px {
-            let scale_m = farthest_m.max(reach_m);
-            let slack_m = (reach_m - look.nearest_m).min(seen_by_m);
-            let slack_m = self.path_of(region, slack_m, scale_m);
+            let scale_m = farthest_m.max(own_m);
+            let slack_m = self.path_of(region, slack(1.0).min(seen_by_m), scale_m);
             return Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m });
         }
         let lens = self.lens(region);
@@ -344,15 +371,15 @@ impl Sight {
             return Verdict::Urgent(error_px);
         }
         // What is left of dg, and of sight.
-        let slack_m = reach_m - look.nearest_m * lens.shrink - 1e-9 * lens.far_m - 1e-6;
+        let slack_m = slack(lens.shrink) - 1e-9 * lens.far_m - 1e-6;
         let (strength, tangent) = (lens.strength(), 1.0 + self.corner_tangent);
         let far = self.stretch_far(region);
         let path = 1.5 * self.stretch(region) + 3.0 + 3.0 * far;
         let turn = (3.0 + 1.2 * strength * tangent) / path;
-        let most_m = 0.1 * look.nearest_m * (1.0 / far).min(lens.across / tangent);
+        let most_m = 0.1 * look.all_m * (1.0 / far).min(lens.across / tangent);
         let lens_m = (slack_m / (strength * path)).min(most_m);
         let slack_m = lens_m.min(self.path_of(region, seen_by_m, lens.far_m));
-        let scale_m = farthest_m.max(reach_m).max(lens.far_m) * turn.max(1.0);
+        let scale_m = farthest_m.max(own_m).max(lens.far_m) * turn.max(1.0);
         Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m })
     }
 }
@@ -387,10 +414,13 @@ pub fn motion_between(before: &[Sight], now: &[Sight]) -> Option<Motion> {
     now.iter().zip(before).map(of).try_fold(Motion::default(), |most, one| Some(most.most(one?)))
 }
 
-/// Distance of a region and its error if it lay in the middle of the picture.
+/// Distances of a region and its error if it lay in the middle of the picture.
 struct Look {
     distance_m: f64,
-    nearest_m: f64,
+    /// To the diamond's own triangles, at least the near distance.
+    own_m: f64,
+    /// To all that descends from it, the same.
+    all_m: f64,
     flat_px: f64,
 }
 

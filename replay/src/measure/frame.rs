@@ -3,26 +3,30 @@
 //! In:    a terrain after a frame, that frame's output, pages.
 //! Out:   [`FrameErrors`]; [`FlightErrors`].
 //! Keeps: [`Measure`]: the reference, the meshes of this frame and of the one before.
-//! Not here: what a single ray meets (`reference`, `raster`, `mesh`).
+//! Not here: what a single ray meets (`reference`, `raster`, `mesh`), the costly metrics
+//!        (`thorough`), names and units (`report`).
 //!
 //! E1, the radial pixel error: a ray meets the ground at x, whose geodetic normal is n. The mesh
 //! meets the vertical of n at m; the error is the distance of the pixels of m and x. P1, the pop:
-//! the distance of the pixels of m now and m in the frame before, both as seen now.
+//! the distance of the pixels of m now and m in the frame before, both as seen now; counted where
+//! the place was in the picture of the frame before as well.
 
+use super::cast::Caster;
 use super::errors::{FlightErrors, FrameErrors};
-use super::mesh::MeshThen;
+use super::holes::Seen;
+use super::mesh::{Foothold, MeshThen};
 use super::raster::Raster;
 use super::rays::Grid;
-use super::reference::{Hit, MakePage, Reference};
+use super::reference::{Hit, MakePage, Nearby, Reference};
 use super::screen::Screen;
 use super::spread::{Gathered, Spread, Where};
+use super::thorough;
 use glam::{DVec2, DVec3};
 use overfly_core::camera::Camera;
 use overfly_core::frame::{FrameOutput, Terrain};
 use overfly_core::geodesy::{Ecef, Ellipsoid};
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// How a flight is measured.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -35,39 +39,72 @@ pub struct MeasureSettings {
     pub cell_px: f64,
     /// Threads that trace rays, the caller's included.
     pub threads: usize,
+    /// Every so many measured frames the costly metrics are measured too, the first one included;
+    /// 0 is never.
+    pub thorough_every: u64,
+    /// Every so many measured frames a part of E1 is found a second way, the first one included;
+    /// 0 is never.
+    pub cross_every: u64,
 }
 
 impl Default for MeasureSettings {
     fn default() -> Self {
-        Self { rays: 100_000, seed: 1, cell_px: 1.0, threads: 1 }
+        Self {
+            rays: 100_000,
+            seed: 1,
+            cell_px: 1.0,
+            threads: 1,
+            thorough_every: 30,
+            cross_every: 90,
+        }
     }
 }
 
-/// What one ray found.
-#[derive(Clone, Copy, Debug, Default)]
-struct Found {
-    /// Distance of mesh and ground on the screen; negative where there is none to tell.
-    e1_px: f64,
-    e2_share: f64,
-    p1_px: f64,
-    ground_m: f64,
-    normal: DVec3,
-    lost: bool,
+/// What one ray found. Where there is nothing to tell a number is negative.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub(super) e1_px: f64,
+    pub(super) e2_share: f64,
+    pub(super) e2_m: f64,
+    pub(super) p1_px: f64,
+    pub(super) p3_deg: f64,
+    /// 0 where there is no ground.
+    pub(super) ground_m: f64,
+    pub(super) normal: DVec3,
+    pub(super) lost: bool,
+}
+
+impl Found {
+    const NOTHING: Self = Self {
+        e1_px: -1.0,
+        e2_share: -1.0,
+        e2_m: -1.0,
+        p1_px: -1.0,
+        p3_deg: -1.0,
+        ground_m: 0.0,
+        normal: DVec3::ZERO,
+        lost: false,
+    };
 }
 
 /// Measures the frames of a flight.
 pub struct Measure {
-    settings: MeasureSettings,
-    body: Ellipsoid,
+    pub(super) settings: MeasureSettings,
+    pub(super) body: Ellipsoid,
     /// The ground itself.
     pub reference: Reference,
-    /// The mesh of the frame that was measured last.
+    /// The mesh of the frame that was taken last.
     pub now: MeshThen,
-    before: MeshThen,
-    has_before: bool,
-    raster: Raster,
-    found: Vec<Found>,
+    /// The mesh of the frame before.
+    pub before: MeshThen,
+    /// The picture of the frame before, if pops can be counted from it.
+    then: Option<Screen>,
+    /// The picture of the frame that was taken last.
+    seen: Option<Screen>,
+    pub(super) raster: Raster,
+    pub(super) found: Vec<Found>,
     grid: Option<Grid>,
+    measured: u64,
 }
 
 impl Measure {
@@ -80,26 +117,32 @@ impl Measure {
             reference: Reference::new(scene.body, scene.sea, settings.cell_px, settings.threads),
             now: MeshThen::new(scene.body),
             before: MeshThen::new(scene.body),
-            has_before: false,
+            then: None,
+            seen: None,
             raster: Raster::default(),
             found: Vec::new(),
             grid: None,
+            measured: 0,
         }
     }
 
-    /// Remembers a frame that is not measured itself: pops of the next are counted from it.
-    pub fn note(&mut self, terrain: &Terrain, output: &FrameOutput) {
+    /// Takes the mesh of a frame over; the one taken before it becomes what pops are counted from.
+    /// For a frame that is not measured itself this is all that there is to do, and it need only
+    /// be done for the last one before a frame that is.
+    pub fn take(&mut self, terrain: &Terrain, output: &FrameOutput) {
+        std::mem::swap(&mut self.now, &mut self.before);
         self.now.take(terrain, output.time_ms);
-        self.has_before = true;
+        self.then = self.seen.replace(Screen::new(&output.views[0].camera));
     }
 
-    /// Nothing pops from the last frame to the next: the camera was cut.
+    /// Nothing pops from the last frame to the next: other frames lie between, or the camera was
+    /// cut.
     pub fn cut(&mut self) {
-        self.has_before = false;
+        self.seen = None;
     }
 
     /// Measures the first view of the frame that a terrain has just run. The frame before must
-    /// have been noted or measured, else pops are not counted.
+    /// have been taken or measured, else pops are not counted.
     pub fn frame(
         &mut self,
         (terrain, output): (&Terrain, &FrameOutput),
@@ -107,28 +150,50 @@ impl Measure {
         make: MakePage<'_>,
         flight: &mut FlightErrors,
     ) {
-        std::mem::swap(&mut self.now, &mut self.before);
-        self.now.take(terrain, output.time_ms);
+        self.take(terrain, output);
+        self.judge((terrain, output), frame, make, flight);
+    }
+
+    /// Measures the frame whose mesh was taken last: [`Self::now`] is what is judged.
+    pub fn judge(
+        &mut self,
+        (terrain, output): (&Terrain, &FrameOutput),
+        frame: u64,
+        make: MakePage<'_>,
+        flight: &mut FlightErrors,
+    ) {
         let camera = &output.views[0].camera;
         let screen = Screen::new(camera);
         let grid = Grid::new(screen.size_px, self.settings.rays, (self.settings.seed, frame));
         self.grid = Some(grid);
-        self.reference.gather(&screen, make);
-        self.raster.draw(&self.now.drawn, &screen, &grid);
-        self.trace(&screen, &grid);
         let mut errors = FrameErrors {
             frame,
             bound_px: output.counts.error_px_bound,
             rays: grid.len() as u64,
-            stretched: u64::from(self.raster.stretched),
-            triangles: u64::from(self.raster.triangles),
-            missing_pages: self.reference.missing as u64,
+            mesh_triangles: u64::from(output.counts.triangles),
             ..FrameErrors::default()
         };
         self.place_eye(camera, &mut errors);
+        if self.then.is_some_and(|then| is_cut(&then, &screen, errors.above_m)) {
+            self.then = None;
+            flight.cuts += 1;
+        }
+        if self.then.is_some() {
+            errors.gap_ms = self.now.time_ms.wrapping_sub(self.before.time_ms);
+        }
+        self.reference.gather(&screen, make);
+        self.raster.draw(&self.now.drawn, &screen, &grid);
+        self.trace(&screen, &grid);
+        errors.stretched = u64::from(self.raster.stretched);
+        errors.triangles = u64::from(self.raster.triangles);
+        errors.missing_pages = self.reference.missing as u64;
         self.gather(&grid, &mut errors, flight);
-        self.count_holes(&grid, &mut errors);
-        self.has_before = true;
+        self.count_holes((&screen, &grid), &mut errors);
+        let due = |every: u64| every > 0 && self.measured.is_multiple_of(every);
+        let due = [due(self.settings.thorough_every), due(self.settings.cross_every)];
+        let shot = thorough::Shot { terrain, output, screen, grid, make, frame };
+        errors.thorough = thorough::measure(self, &shot, due);
+        self.measured += 1;
         flight.frames.push(errors);
     }
 
@@ -139,11 +204,16 @@ impl Measure {
         errors.above_m = foothold.map_or(f64::NAN, |found| at.height_m - found.height_m);
     }
 
+    /// Whether there is a frame before, from which pops are counted.
+    pub(super) fn has_before(&self) -> bool {
+        self.then.is_some()
+    }
+
     /// All rays, tile by tile on all threads; each result has its own place.
     fn trace(&mut self, screen: &Screen, grid: &Grid) {
         let mut found = std::mem::take(&mut self.found);
         found.clear();
-        found.resize(grid.len(), Found::default());
+        found.resize(grid.len(), Found::NOTHING);
         let columns = grid.columns as usize;
         let bands: Vec<Mutex<(usize, &mut [Found])>> =
             found.chunks_mut(columns * TILE).enumerate().map(Mutex::new).collect();
@@ -152,58 +222,59 @@ impl Measure {
             while let Some(band) = bands.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let mut band = band.lock().unwrap_or_else(PoisonError::into_inner);
                 let (at, rays) = &mut *band;
-                self.trace_band(screen, grid, (*at * TILE, rays));
+                self.trace_band((screen, grid), *at * TILE, rays);
             }
         };
         std::thread::scope(|scope| {
-            for _ in 1..self.settings.threads.max(1) {
-                scope.spawn(work);
-            }
+            (1..self.settings.threads.max(1)).for_each(|_| drop(scope.spawn(work)));
             work();
         });
         self.found = found;
     }
 
-    fn trace_band(&self, screen: &Screen, grid: &Grid, (first, rays): (usize, &mut [Found])) {
+    fn trace_band(&self, (screen, grid): (&Screen, &Grid), first: usize, rays: &mut [Found]) {
         let columns = grid.columns as usize;
         let rows = rays.len() / columns;
         let stratum = grid.stratum_px();
+        let caster = Caster { reference: &self.reference, screen };
         for left in (0..columns).step_by(TILE) {
             let right = (left + TILE).min(columns);
             let corner = |column: usize, row: usize| {
-                let pixel = DVec2::new(column as f64, (first + row) as f64) * stratum;
-                screen.to_body(screen.tangents(pixel))
+                DVec2::new(column as f64, (first + row) as f64) * stratum
             };
-            let corners =
-                [corner(left, 0), corner(right, 0), corner(right, rows), corner(left, rows)];
-            let middle = corners[0] + corners[1] + corners[2] + corners[3];
-            let planes = [0, 1, 2, 3].map(|i| {
-                let plane = corners[(i + 1) % 4].cross(corners[i]).normalize();
-                if plane.dot(middle) < 0.0 { -plane } else { plane }
-            });
-            let nearby = self.reference.nearby(screen.eye, &planes);
+            let nearby = caster.within(corner(left, 0), corner(right, rows));
             let mut level = 30;
             for (row, column) in (0..rows).flat_map(|row| (left..right).map(move |c| (row, c))) {
-                let [c, r] = [column, first + row].map(|at| u32::try_from(at).expect("a stratum"));
-                let direction = screen.to_body(screen.tangents(grid.pixel(c, r)));
-                let hit = self.reference.meet(&nearby, screen.eye, direction);
-                let at = row * columns + column;
-                rays[at] = Found { e1_px: -1.0, ..Found::default() };
-                let Some(hit) = hit.filter(|hit| hit.depth_m >= screen.near_m) else { continue };
-                let mesh_m = self.raster.depth_m[(first + row) * columns + column];
-                rays[at] = self.compare(screen, (&hit, mesh_m), &mut level);
+                let at = (column, first + row);
+                rays[row * columns + column] =
+                    self.trace_ray(&caster, (&nearby, grid), at, &mut level);
             }
         }
     }
 
-    fn compare(&self, screen: &Screen, (hit, mesh_m): (&Hit, f64), level: &mut u8) -> Found {
-        let mut found = Found {
-            e1_px: -1.0,
-            e2_share: (mesh_m - hit.depth_m).abs() / hit.depth_m,
-            ground_m: hit.depth_m,
-            normal: hit.normal,
-            ..Found::default()
-        };
+    /// The ray of stratum (column, row).
+    fn trace_ray(
+        &self,
+        caster: &Caster<'_>,
+        (nearby, grid): (&Nearby, &Grid),
+        (column, row): (usize, usize),
+        level: &mut u8,
+    ) -> Found {
+        let [c, r] = [column, row].map(|at| u32::try_from(at).expect("a stratum"));
+        let pixel = grid.pixel(c, r);
+        let Some(hit) = caster.meet(nearby, pixel) else { return Found::NOTHING };
+        let mesh_m = self.raster.depth_m[row * grid.columns as usize + column];
+        let found = self.compare(caster.screen, &hit, level);
+        if !mesh_m.is_finite() {
+            return found;
+        }
+        let along_m = (mesh_m - hit.depth_m).abs();
+        let length = caster.screen.tangents(pixel).length();
+        Found { e2_share: along_m / hit.depth_m, e2_m: along_m * length, ..found }
+    }
+
+    fn compare(&self, screen: &Screen, hit: &Hit, level: &mut u8) -> Found {
+        let mut found = Found { ground_m: hit.depth_m, normal: hit.normal, ..Found::NOTHING };
         let Some(now) = self.now.find(hit.normal, *level) else {
             return Found { lost: true, ..found };
         };
@@ -213,86 +284,89 @@ impl Measure {
             return found;
         };
         found.e1_px = (a - b).length();
-        found.p1_px = self.pop_px(screen, hit, (now, a)).unwrap_or(0.0);
+        if self.then.is_some_and(|then| then.shows(hit.place)) {
+            let pop = self.pop(screen, hit, (&now, a));
+            (found.p1_px, found.p3_deg) = pop.unwrap_or((0.0, 0.0));
+        }
         found
     }
 
-    /// How far the mesh moved on the screen since the frame before, the screen being now's.
-    fn pop_px(
+    /// How far the mesh moved on the screen since the frame before, the screen being now's, and
+    /// by how many degrees its shading normal turned.
+    fn pop(
         &self,
         screen: &Screen,
         hit: &Hit,
-        (now, pixel): (super::mesh::Foothold, DVec2),
-    ) -> Option<f64> {
-        let leaf = self.now.leaf(&now);
+        (now, pixel): (&Foothold, DVec2),
+    ) -> Option<(f64, f64)> {
+        let leaf = self.now.leaf(now);
         let same = |at: usize| {
             let was = &self.before.drawn.leaves[at];
             was.content == leaf.content && !was.morphs && !leaf.morphs
         };
-        if !self.has_before || self.before.drawn.find(leaf.key).is_some_and(same) {
+        if self.before.drawn.find(leaf.key).is_some_and(same) {
             return None;
         }
         let then = self.before.find(hit.normal, leaf.level)?;
         let mesh = hit.place + hit.normal * (then.height_m - hit.height_m);
-        Some((screen.pixel(mesh)? - pixel).length())
+        let turned_rad = angle_rad(self.now.shading(now), self.before.shading(&then));
+        Some(((screen.pixel(mesh)? - pixel).length(), turned_rad.to_degrees()))
     }
 
     fn gather(&mut self, grid: &Grid, errors: &mut FrameErrors, flight: &mut FlightErrors) {
-        let met: Vec<usize> =
-            (0..self.found.len()).filter(|&at| self.found[at].e1_px >= 0.0).collect();
-        let seen = |at: usize| {
-            let index = met[at];
-            let place = Ecef(self.body.surface_from_normal(self.found[index].normal));
-            let place = self.body.geodetic_from_ecef(place);
-            let columns = grid.columns as usize;
-            let [c, r] = [index % columns, index / columns];
-            let [c, r] = [c, r].map(|at| u32::try_from(at).expect("a stratum"));
-            Where {
-                frame: errors.frame,
-                lat_deg: place.lat_rad.to_degrees(),
-                lon_deg: place.lon_rad.to_degrees(),
-                pixel: grid.pixel(c, r).to_array(),
-            }
-        };
         let of = |value: fn(&Found) -> f64, gathered: &mut Gathered| {
+            let met = |&at: &usize| value(&self.found[at]) >= 0.0;
+            let met: Vec<usize> = (0..self.found.len()).filter(met).collect();
             let mut values: Vec<f64> = met.iter().map(|&at| value(&self.found[at])).collect();
-            let spread = Spread::of(&mut values, seen);
+            let spread = Spread::of(&mut values, |at| self.place(grid, met[at], errors.frame));
             gathered.add(&values, &spread);
             spread
         };
         let e1_px = of(|found| found.e1_px, &mut flight.e1_px);
-        let e2_share = of(|found| found.e2_share.min(1e9), &mut flight.e2_share);
+        let e2_share = of(|found| found.e2_share, &mut flight.e2_share);
+        let e2_m = of(|found| found.e2_m, &mut flight.e2_m);
         let p1_px = of(|found| found.p1_px, &mut flight.p1_px);
-        (errors.e1_px, errors.e2_share, errors.p1_px) = (e1_px, e2_share, p1_px);
-        errors.lost = self.found.iter().filter(|found| found.lost).count() as u64;
+        let p3_deg = of(|found| found.p3_deg, &mut flight.p3_deg);
+        (errors.e1_px, errors.e2_share, errors.e2_m) = (e1_px, e2_share, e2_m);
+        (errors.p1_px, errors.p3_deg) = (p1_px, p3_deg);
+        let count = |is: fn(&Found) -> bool| self.found.iter().filter(|f| is(f)).count() as u64;
+        errors.lost = count(|found| found.lost);
+        errors.p1_above_half = count(|found| found.p1_px > 0.5);
     }
 
-    /// Rays that only one of both meets, and what of them is a hole: all eight around it meet
-    /// both, and agree.
-    fn count_holes(&self, grid: &Grid, errors: &mut FrameErrors) {
-        let (columns, rows) = (grid.columns as usize, grid.rows as usize);
+    /// Where a ray met the ground.
+    fn place(&self, grid: &Grid, ray: usize, frame: u64) -> Where {
+        let columns = grid.columns as usize;
+        let [c, r] = [ray % columns, ray / columns];
+        let [c, r] = [c, r].map(|at| u32::try_from(at).expect("a stratum"));
+        self.place_of(self.found[ray].normal, grid.pixel(c, r), frame)
+    }
+
+    /// A place by its normal.
+    pub(super) fn place_of(&self, normal: DVec3, pixel: DVec2, frame: u64) -> Where {
+        let at = self.body.geodetic_from_ecef(Ecef(self.body.surface_from_normal(normal)));
+        Where {
+            frame,
+            lat_deg: at.lat_rad.to_degrees(),
+            lon_deg: at.lon_rad.to_degrees(),
+            pixel: pixel.to_array(),
+        }
+    }
+
+    fn count_holes(&self, (screen, grid): (&Screen, &Grid), errors: &mut FrameErrors) {
         let ground = |at: usize| self.found[at].ground_m > 0.0;
         let mesh = |at: usize| self.raster.depth_m[at].is_finite();
         let differ = (0..grid.len()).filter(|&at| ground(at) != mesh(at));
         errors.e3_rays = differ.count() as u64;
-        for (row, column) in (1..rows.saturating_sub(1))
-            .flat_map(|r| (1..columns.saturating_sub(1)).map(move |c| (r, c)))
-        {
-            let at = row * columns + column;
-            if !ground(at) {
-                continue;
-            }
-            let ratio = |at: usize| self.raster.depth_m[at] / self.found[at].ground_m;
-            let agrees = |at: usize| ground(at) && mesh(at) && (ratio(at) - 1.0).abs() < AGREE;
-            let around = [at - columns - 1, at - columns, at - columns + 1, at - 1, at + 1]
-                .into_iter()
-                .chain([at + columns - 1, at + columns, at + columns + 1]);
-            if !mesh(at) && around.clone().all(agrees) {
-                errors.holes += 1;
-            } else if mesh(at) && ratio(at) > 1.0 + 10.0 * AGREE && around.clone().all(agrees) {
-                errors.pinholes += 1;
-            }
-        }
+        let seen = Seen {
+            caster: Caster { reference: &self.reference, screen },
+            grid,
+            ground_m: &|at| self.found[at].ground_m,
+            raster: &self.raster,
+            mesh: &self.now.drawn,
+            bound_px: errors.bound_px,
+        };
+        [errors.holes, errors.pinholes] = seen.count();
     }
 
     /// E1 of every ray of the frame that was measured last, row by row, and how many are in a row;
@@ -303,7 +377,17 @@ impl Measure {
     }
 }
 
+/// Whether the eye has jumped or turned so far that it is another view.
+fn is_cut(then: &Screen, now: &Screen, above_m: f64) -> bool {
+    let reach_m = 100.0_f64.max(0.2 * above_m.abs());
+    let turned = then.axes.iter().zip(&now.axes).any(|(then, now)| then.dot(*now) < 0.5);
+    turned || (then.eye - now.eye).length() > reach_m
+}
+
+/// Angle between two vectors, also where it is tiny.
+fn angle_rad(a: DVec3, b: DVec3) -> f64 {
+    libm::atan2(a.cross(b).length(), a.dot(b))
+}
+
 /// Strata along one side of a tile, whose rays look at the same plates.
 const TILE: usize = 16;
-/// Depths of mesh and ground that differ by less agree.
-const AGREE: f64 = 0.02;

@@ -47,6 +47,26 @@ impl Screen {
         (view.z > 0.0).then(|| self.pixel_of(view))
     }
 
+    /// Whether a point lies in the picture, whatever is in front of it.
+    pub fn shows(&self, point: DVec3) -> bool {
+        let [width, height] = self.size_px;
+        let inside = |px: DVec2| px.min_element() >= 0.0 && px.x <= width && px.y <= height;
+        self.pixel(point).is_some_and(inside)
+    }
+
+    /// The same picture lying on another side: turned by so many quarters clockwise.
+    pub fn turned(&self, quarters: u8) -> Self {
+        let [right, up, forward] = self.axes;
+        let [width, height] = self.size_px;
+        let (axes, size_px) = match quarters % 4 {
+            0 => ([right, up], [width, height]),
+            1 => ([up, -right], [height, width]),
+            2 => ([-right, -up], [width, height]),
+            _ => ([-up, right], [height, width]),
+        };
+        Self { axes: [axes[0], axes[1], forward], size_px, ..*self }
+    }
+
     /// Pixel of a point in camera axes before the eye.
     pub fn pixel_of(&self, view: DVec3) -> DVec2 {
         let scale = self.scale_px / view.z;

@@ -120,7 +120,7 @@ impl Gathered {
     /// The spread of all of it.
     pub fn spread(&self) -> Spread {
         if self.count == 0 {
-            return Spread::default();
+            return Spread::merged(std::iter::empty());
         }
         let rank = |permille: u64| {
             let rank = (self.count * permille).div_ceil(1000).max(1);

@@ -1,0 +1,180 @@
+//! Advice: the cheapest point for a stated error, the most accurate for a stated budget; and where
+//! to look on when no point will do.
+//!
+//! In:    a goal, what points yielded.
+//! Out:   which point; the next limits to try.
+//! Keeps: [`Search`]: what lies on either side of the goal.
+//! Not here: flying what is tried (the host).
+
+use super::yields::Yield;
+
+/// What a scene shall keep.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Goal {
+    /// E1 p99.9 of the worst measured frame, and the bound where the tolerance decides; pixels.
+    ErrorPx(f64),
+    /// CPU time of a frame, p99; milliseconds.
+    BudgetMs(f64),
+}
+
+impl Goal {
+    /// Share of an error that is kept free: frames that were not measured differ a little.
+    pub const ERROR_MARGIN: f64 = 0.05;
+    /// Share of a budget that is kept free: machines are not always equally fast.
+    pub const BUDGET_MARGIN: f64 = 0.15;
+
+    /// What a point may have at most, the margin kept free.
+    pub fn aim(&self) -> f64 {
+        match self {
+            Self::ErrorPx(px) => px * (1.0 - Self::ERROR_MARGIN),
+            Self::BudgetMs(ms) => ms * (1.0 - Self::BUDGET_MARGIN),
+        }
+    }
+
+    /// What of a point the goal is about.
+    pub fn of(&self, found: &Yield) -> f64 {
+        match self {
+            Self::ErrorPx(_) => found.promise_px(),
+            Self::BudgetMs(_) => found.cpu_ms[1],
+        }
+    }
+
+    /// Whether a point meets it, margin included.
+    pub fn meets(&self, found: &Yield) -> bool {
+        self.of(found) <= self.aim()
+    }
+
+    /// Whether a point keeps what was stated, the margin being used up or not.
+    pub fn keeps(&self, found: &Yield) -> bool {
+        match self {
+            Self::ErrorPx(px) => self.of(found) <= *px,
+            Self::BudgetMs(ms) => self.of(found) <= *ms,
+        }
+    }
+
+    /// What is least among points that meet the goal, first things first.
+    fn price(&self, found: &Yield) -> [f64; 2] {
+        match self {
+            Self::ErrorPx(_) => [found.cpu_ms[0], found.triangles],
+            Self::BudgetMs(_) => [found.error_px, found.triangles],
+        }
+    }
+}
+
+/// The best point that meets the goal; `Err` with the one that comes nearest where none does, and
+/// nothing where nothing is known of any.
+pub fn choose(goal: Goal, found: &[Yield]) -> Result<usize, Option<usize>> {
+    let known = (0..found.len()).filter(|&i| goal.of(&found[i]).is_finite());
+    let by = |key: &dyn Fn(&Yield) -> [f64; 2], a: usize, b: usize| {
+        let (a, b) = (key(&found[a]), key(&found[b]));
+        a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+    };
+    let meeting = known.clone().filter(|&i| goal.meets(&found[i]));
+    let best = meeting.min_by(|&a, &b| by(&|y| goal.price(y), a, b));
+    best.ok_or_else(|| known.min_by(|&a, &b| by(&|y| [goal.of(y), y.triangles], a, b)))
+}
+
+/// A search for the number of triangles that meets a goal: outwards in steps of two until one
+/// does, then by halves on the logarithm between the last that does not and the first that does.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// Most triangles that were tried on the side that misses and on the side that meets.
+    misses: f64,
+    meets: Option<f64>,
+    /// 2 where more triangles are better, ½ where fewer are.
+    step: f64,
+    left: u32,
+}
+
+/// Points that a search tries at most.
+const TRIES: u32 = 6;
+/// Neighbours this near to each other, as a ratio, are not told apart.
+const NEAR: f64 = 1.12;
+
+impl Search {
+    /// From a number of triangles that misses the goal.
+    pub fn from(goal: Goal, triangles_max: u32) -> Self {
+        let step = if matches!(goal, Goal::ErrorPx(_)) { 2.0 } else { 0.5 };
+        Self { misses: f64::from(triangles_max), meets: None, step, left: TRIES }
+    }
+
+    /// The next to try, within `range`; `None` when the search is over.
+    pub fn next(&self, range: [u32; 2]) -> Option<u32> {
+        let tried = match self.meets {
+            None => self.misses * self.step,
+            Some(meets) => (self.misses * meets).sqrt(),
+        };
+        let [least, most] = range.map(f64::from);
+        let near = self.meets.is_some_and(|meets| {
+            let ratio = meets / self.misses;
+            ratio.max(1.0 / ratio) < NEAR * NEAR
+        });
+        let over = near || self.left == 0 || tried < least || tried > most;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
+        let tried = tried.round() as u32;
+        (!over).then_some(tried)
+    }
+
+    /// What the tried one did.
+    pub fn told(&mut self, triangles_max: u32, met: bool) {
+        if met {
+            self.meets = Some(f64::from(triangles_max));
+        } else {
+            self.misses = f64::from(triangles_max);
+        }
+        self.left -= 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(error_px: f64, triangles: f64, ms: f64) -> Yield {
+        Yield {
+            error_px,
+            rms_px: error_px / 4.0,
+            bound_px: 4.0 * error_px,
+            tolerance_px: 1e-2,
+            triangles_max: triangles,
+            triangles_span: [triangles; 2],
+            triangles,
+            cpu_ms: [ms, 2.0 * ms],
+        }
+    }
+
+    #[test]
+    fn the_cheapest_for_an_error_and_the_most_accurate_for_a_budget() {
+        let found = [point(2.0, 1e4, 0.2), point(0.9, 5e4, 0.5), point(0.5, 1e5, 0.8)];
+        assert_eq!(choose(Goal::ErrorPx(1.0), &found), Ok(1));
+        assert_eq!(choose(Goal::ErrorPx(0.94), &found), Ok(2), "the margin is kept free");
+        assert_eq!(choose(Goal::ErrorPx(0.1), &found), Err(Some(2)));
+        assert_eq!(choose(Goal::BudgetMs(1.2), &found), Ok(1));
+        assert_eq!(choose(Goal::BudgetMs(0.1), &found), Err(Some(0)));
+        assert_eq!(choose(Goal::ErrorPx(1.0), &[]), Err(None));
+    }
+
+    #[test]
+    fn equal_times_are_decided_by_triangles_and_what_is_not_timed_has_no_budget() {
+        let mut found = [point(0.9, 5e4, 0.5), point(0.8, 4e4, 0.5)];
+        assert_eq!(choose(Goal::ErrorPx(1.0), &found), Ok(1));
+        found[0].cpu_ms = [f64::NAN; 2];
+        assert_eq!(choose(Goal::BudgetMs(9.0), &found), Ok(1));
+    }
+
+    #[test]
+    fn a_search_closes_in_on_where_the_goal_is_met() {
+        let goal = Goal::ErrorPx(1.0);
+        let mut search = Search::from(goal, 100_000);
+        let mut least_met = u32::MAX;
+        while let Some(tried) = search.next([128, 16_000_000]) {
+            let met = tried >= 310_000;
+            least_met = if met { least_met.min(tried) } else { least_met };
+            search.told(tried, met);
+        }
+        assert!((310_000..360_000).contains(&least_met), "{least_met}");
+        let fewer = Search::from(Goal::BudgetMs(1.0), 100_000);
+        assert_eq!(fewer.next([128, 16_000_000]), Some(50_000));
+        assert_eq!(Search::from(goal, 16_000_000).next([128, 16_000_000]), None);
+    }
+}
