@@ -275,7 +275,7 @@ fn patch_depth(reader: &mut Reader, lod: &Group) -> Option<u8> {
 
 /// The coarsest mesh has 8 leaves, each drawn as a patch.
 fn triangles_max(reader: &mut Reader, lod: &Group, patch_depth: Option<u8>) -> Option<u32> {
-    let value = reader.whole(lod, "triangles_max", 8..=TRIANGLES_MAX, 100_000)?;
+    let value = reader.whole(lod, "triangles_max", 8..=TRIANGLES_MAX, 200_000)?;
     let depth = patch_depth?;
     let least = 8_u32 << depth;
     if value >= least {

@@ -200,7 +200,7 @@ impl Default for RawLod {
     fn default() -> Self {
         Self {
             tolerance_px: 1.0,
-            triangles_max: 100_000,
+            triangles_max: 200_000,
             patch_depth: 4,
             splits_max: 512,
             merges_max: 512,

@@ -49,7 +49,7 @@ fn earth_resolves_to_what_it_says() {
     assert_eq!((planet.seed, planet.style), (2029, Style::Earthlike));
     assert_eq!((planet.relief, planet.finest_m, earth.detail()), (1.0, 0.15, 1.0));
     assert_eq!(earth.sources.len(), 1);
-    assert_eq!((earth.lod.tolerance.0, earth.lod.triangles_max), (1.0, 100_000));
+    assert_eq!((earth.lod.tolerance.0, earth.lod.triangles_max), (1.0, 200_000));
     assert_eq!((earth.lod.patch_depth, earth.lod.level_max), (4, 50));
     assert_eq!((earth.lod.splits_max, earth.lod.merges_max), (512, 512));
     assert_eq!(earth.lod.wanted_max, 32);

@@ -108,8 +108,9 @@ pub struct FrameCounts {
     pub built: u32,
     /// Patches drawn, summed over views and depth ranges.
     pub drawn: u32,
-    /// Error bound on the screen of the worst leaf, in pixels; above the tolerance where the
-    /// budget, the operation cap, the deepest level or missing pages ended the refinement.
+    /// Bound on the error on the screen in pixels: the tolerance, or that of the worst leaf where
+    /// the budget, the operation cap, the deepest level or missing pages ended the refinement, or
+    /// of the worst diamond whose split still morphs.
     pub error_px_bound: f64,
 }
 

@@ -412,6 +412,12 @@ fn refine_surface(terrain: &Terrain) {
         want::roots(planet.pages, &mut output.wanted);
     }
     count(&mut output.counts, mesh, &done, terrain.settings.lod.patch_depth);
+    if let Some(morphing) = &terrain.morphing {
+        let now = (output.time_ms, morphing.duration_ms);
+        let morphing_px = planet.cover.morphing_px(&mesh.diamonds, planet.sights, now);
+        let bound_px = &mut output.counts.error_px_bound;
+        *bound_px = if morphing_px > *bound_px { morphing_px } else { *bound_px };
+    }
     output.counts.wanted = u32::try_from(output.wanted.len()).expect("a bounded list");
     output.digest.mesh = planet.cover.digest();
 }

@@ -9,7 +9,7 @@ use super::agenda::{Band, Verdict};
 use super::diamonds::{Diamond, DiamondId, Diamonds, leaf_key};
 use super::reach::{cap_of, own_cap_of, page_depth, page_is_finest};
 use super::refine::Rule;
-use super::screen_error::{Horizon, Region, Sight, judge_leaf, judge_parent};
+use super::screen_error::{Horizon, Region, Sight, judge_leaf, judge_parent, priority_px};
 use crate::columns::{Column, Id};
 use crate::datasource::pages::Pages;
 use crate::datasource::{Page, PageKey};
@@ -35,6 +35,8 @@ pub struct Cover {
     /// When a split diamond was split, on the frame's clock in milliseconds modulo 2^32; without
     /// any place where the scene does not morph.
     pub split_ms: Column<Diamond, u32>,
+    /// Diamonds whose split still morphs, as far as is known, and when that began.
+    young: Vec<(DiamondId, u32)>,
     digest: u64,
 }
 
@@ -46,8 +48,26 @@ impl Cover {
             pages: Column::new(capacity, || [None; 2]),
             patches: Column::new(capacity, || [None; 2]),
             split_ms: Column::new(if morphs { capacity } else { 0 }, || 0),
+            young: Vec::with_capacity(if morphs { capacity as usize } else { 0 }),
             digest: 0,
         }
+    }
+
+    /// The greatest error in pixels of a diamond whose split still morphs at `now_ms`: what is
+    /// drawn lies between its triangles and finer ones. Forgets those that have arrived or merged.
+    pub fn morphing_px(
+        &mut self,
+        diamonds: &Diamonds,
+        sights: &[Sight],
+        (now_ms, morph_ms): (u32, u32),
+    ) -> f64 {
+        let Self { young, split_ms, region, .. } = self;
+        young.retain(|&(id, since_ms)| {
+            let is_same = diamonds[id].is_split() && split_ms[id] == since_ms;
+            is_same && now_ms.wrapping_sub(since_ms) < morph_ms
+        });
+        let errors_px = young.iter().map(|&(id, _)| priority_px(&region[id], sights));
+        errors_px.fold(0.0, |most, px| if px > most { px } else { most })
     }
 
     /// Sum of the hashes of all leaf triangles.
@@ -161,6 +181,7 @@ impl Rule for Planet<'_> {
     fn follow_split(&mut self, diamonds: &Diamonds, id: DiamondId) {
         if let Some(split_ms) = self.cover.split_ms.as_mut_slice().get_mut(id.index() as usize) {
             *split_ms = self.now_ms;
+            self.cover.young.push((id, self.now_ms));
         }
         for side in 0..2 {
             self.remove_leaf(diamonds, id, side);
