@@ -31,6 +31,10 @@ enum Command {
     View(cli::view::Arguments),
     /// Measures how far what is drawn strays from the ground, over a flight.
     Measure(cli::measure::Arguments),
+    /// Sweeps the knobs of a scene over a flight: what each costs, and what it buys.
+    Trade(cli::trade::Arguments),
+    /// Writes the scene to take for a stated error or a stated budget, and tries it.
+    Recommend(cli::trade::recommend::Arguments),
     /// Checks a scene file and shows what it resolves to; all faults at once.
     Check(cli::check::Arguments),
     /// Says how high the ground is at places, and how sure that is; CSV or JSON.
@@ -54,6 +58,8 @@ fn main() -> ExitCode {
         Command::Still(arguments) => cli::still::run(&arguments),
         Command::View(arguments) => cli::view::run(&arguments),
         Command::Measure(arguments) => cli::measure::run(&arguments),
+        Command::Trade(arguments) => cli::trade::run(&arguments),
+        Command::Recommend(arguments) => cli::trade::recommend::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
         Command::Probe(arguments) => cli::probe::run(&arguments),
         Command::Ingest(arguments) => cli::ingest::run(&arguments),

@@ -15,6 +15,7 @@ mod contracts {
     mod flights;
     mod grounds;
     mod hills;
+    mod measuring;
     mod pictures;
     mod probing;
     mod rainier_agl;
@@ -22,6 +23,7 @@ mod contracts {
     #[allow(dead_code, reason = "the archive's own tests let it misbehave in more ways")]
     #[path = "../../archive/tests/contracts/server.rs"]
     mod server;
+    mod trading;
     mod validation;
     mod window;
 }

@@ -29,6 +29,7 @@ pub mod run;
 pub mod source;
 pub mod still;
 pub mod stills;
+pub mod trade;
 pub mod view;
 
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Set-up and checks: `cargo xtask demo`, `cargo xtask test`.
+//! Set-up, checks and results: `cargo xtask demo`, `cargo xtask test`, `cargo xtask trade`.
 //!
 //! In:    one word on the command line.
 //! Out:   what is done, why, how long it took, and an exit code.
@@ -8,6 +8,7 @@
 
 mod set_up;
 mod steps;
+mod trade;
 
 use set_up::{DRAWING, VALIDATION, Vulkan, set_up};
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ usage: cargo xtask <command>
 commands:
   demo   sets up drawing, builds overfly and flies two flights; pictures go to out/demo
   test   sets up drawing with Vulkan's validation layers and runs every test
+  trade  measures what settings cost over the three flights, into docs/trade.md
   help   prints this
 
 On Debian and Ubuntu, missing packages are installed with apt-get (through sudo if need be).
@@ -31,12 +33,13 @@ fn main() -> ExitCode {
     let done = match words[..] {
         ["demo"] => demo(&root()),
         ["test"] => test(&root()),
+        ["trade"] => trade::trade(&root(), &cargo(), &overfly(&root()).display().to_string()),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             Ok(())
         }
         [] => return refuse("a command is missing"),
-        ["demo" | "test" | "help", ..] => return refuse("a command takes no arguments"),
+        ["demo" | "test" | "trade" | "help", ..] => return refuse("a command takes no arguments"),
         [word, ..] => return refuse(&format!("there is no command {word}")),
     };
     match done {

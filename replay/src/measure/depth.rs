@@ -173,7 +173,7 @@ fn flicker_ppm(points: &Points, buffer: &Buffer, scale_px: f64) -> f64 {
     let mut along: Vec<f64> = points.away.iter().map(|away| away.length()).collect();
     along.sort_unstable_by(f64::total_cmp);
     let Some(&middle_m) = along.get(along.len() / 2) else { return 0.0 };
-    let aside = points.away[0].any_orthonormal_vector();
+    let aside = points.away[0].normalize().any_orthonormal_vector();
     let step_m = aside * (STEP_PX * middle_m / scale_px);
     let (mut before, mut flips): (Option<Vec<bool>>, usize) = (None, 0);
     for step in 0..STEPS {

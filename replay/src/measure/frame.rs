@@ -101,7 +101,8 @@ pub struct Measure {
     then: Option<Screen>,
     /// The picture of the frame that was taken last.
     seen: Option<Screen>,
-    pub(super) raster: Raster,
+    /// What the rays of the frame that was measured last meet of the mesh.
+    pub raster: Raster,
     pub(super) found: Vec<Found>,
     grid: Option<Grid>,
     measured: u64,
@@ -364,7 +365,7 @@ impl Measure {
             ground_m: &|at| self.found[at].ground_m,
             raster: &self.raster,
             mesh: &self.now.drawn,
-            bound_px: errors.bound_px,
+            stray_px: errors.bound_px.min(4.0 * errors.e1_px.p99 + 1.0),
         };
         [errors.holes, errors.pinholes] = seen.count();
     }

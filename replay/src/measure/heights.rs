@@ -19,6 +19,7 @@ use overfly_core::datasource::Page;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::ground::{Ground, LEVEL_MAX, Place, Query};
 use overfly_core::lattice::{RADIUS, fold};
+use std::sync::Arc;
 
 /// Places at which H1 is measured.
 const PLACES: usize = 32;
@@ -56,13 +57,23 @@ const LEVEL_LEAST: u8 = 12;
 /// How far a query's answer is from the height computed anew.
 fn query_error_m(shot: &Shot<'_>, normal: DVec3, level: u8) -> Option<f64> {
     let scene = shot.terrain.settings();
+    let page = (shot.make)(Place::of(normal).triangle(level).0.page())?;
+    answer_error_m((&scene.body, scene.sea), [&page, &page], normal, level)
+}
+
+/// How far `Query::Exact` over the first page is from the height that the second one has, metres.
+pub fn answer_error_m(
+    (body, sea): (&Ellipsoid, bool),
+    [asked, truth]: [&Arc<Page>; 2],
+    normal: DVec3,
+    level: u8,
+) -> Option<f64> {
     let at = at_normal(normal);
-    let page = (shot.make)(Place::of(at.normal()).triangle(level).0.page())?;
-    let mut ground = Ground::new(scene.body, scene.sea);
-    ground.insert(page.clone());
+    let mut ground = Ground::new(*body, sea);
+    ground.insert(asked.clone());
     let answer = ground.height(at, Query::Exact(level)).ok()?;
-    let exact = exact_height_m((&page, scene.sea), &scene.body, at.normal(), level)?;
-    Some((answer.height_m - exact).abs())
+    let exact_m = exact_height_m((truth, sea), body, at.normal(), level)?;
+    Some((answer.height_m - exact_m).abs())
 }
 
 fn at_normal(normal: DVec3) -> Geodetic {
@@ -131,7 +142,7 @@ fn triangle_around(quadrant: u8, normal: DVec3, level: u8) -> [(i32, i32); 3] {
     let (u, v) = if z >= 0.0 { (x, y) } else { (radius - y, radius - x) };
     let side = RADIUS >> (level / 2);
     #[expect(clippy::cast_possible_truncation, reason = "on the square")]
-    let cell = |along: f64| (along / f64::from(side)).floor() as i32;
+    let cell = |along: f64| ((along / f64::from(side)).floor() as i32).min(RADIUS / side - 1);
     let (i, j) = (cell(u), cell(v));
     let (du, dv) = (u / f64::from(side) - f64::from(i), v / f64::from(side) - f64::from(j));
     let half = side / 2;

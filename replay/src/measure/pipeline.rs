@@ -15,7 +15,9 @@ use super::spread::{Spread, Where};
 use super::thorough::{Shot, spread_of};
 use glam::{DVec2, DVec3};
 use overfly_core::camera::Camera;
+use overfly_core::frame::{FrameOutput, Terrain};
 use overfly_core::geodesy::{Ecef, TwoFloat, narrow};
+use overfly_core::inspect::DrawnMesh;
 use overfly_core::mesh::morph::duration_ms;
 use overfly_core::mesh::{PatchMorph, PatchVertex};
 use overfly_core::settings::{SceneSettings, VertexPrecision};
@@ -107,34 +109,41 @@ fn wide(position: &TwoFloat) -> DVec3 {
 }
 
 /// A vertex of the picture, as it is stored and as it is in f64.
-struct Drawn {
-    vertex: PatchVertex,
-    morph: Option<PatchMorph>,
-    exact: DVec3,
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    /// As it is uploaded.
+    pub vertex: PatchVertex,
+    /// Where it comes from, in scenes that morph.
+    pub morph: Option<PatchMorph>,
+    /// Where it is drawn, body-fixed metres.
+    pub exact: DVec3,
 }
 
-/// Every `stride`-th vertex of the draws that lies in the picture.
-fn in_picture(measure: &Measure, shot: &Shot<'_>, stride: usize) -> Vec<Drawn> {
-    let patches = shot.terrain.patches();
+/// The vertices of the draws of the first view that lie in its picture.
+pub fn in_picture(
+    (terrain, output): (&Terrain, &FrameOutput),
+    mesh: &DrawnMesh,
+    screen: &Screen,
+) -> Vec<Drawn> {
+    let patches = terrain.patches();
     let mut is_drawn = vec![false; patches.used_end() as usize];
-    let ranges = &shot.output.views[0].ranges;
+    let ranges = &output.views[0].ranges;
     ranges.iter().flat_map(|range| &range.patches).for_each(|&s| is_drawn[s as usize] = true);
-    let mesh = &measure.now.drawn;
-    let drawn = (0..mesh.leaves.len()).filter(|&at| is_drawn[mesh.leaves[at].slot as usize]);
+    let is_drawn = |at: &usize| is_drawn.get(mesh.leaves[*at].slot as usize) == Some(&true);
+    let drawn = (0..mesh.leaves.len()).filter(is_drawn);
     let vertices = drawn.flat_map(|at| {
         let slot = mesh.leaves[at].slot;
         let (vertices, morphs) = (patches.vertices_of(slot), patches.morphs_of(slot));
         let exact = mesh.places_of(at).iter().zip(vertices).enumerate();
-        exact.map(move |(i, (&exact, &vertex))| Drawn {
-            vertex,
-            morph: morphs.get(i).copied(),
-            exact,
-        })
+        exact.map(|(i, (&exact, &vertex))| Drawn { vertex, morph: morphs.get(i).copied(), exact })
     });
-    let near_m = shot.screen.near_m;
     let seen =
-        |drawn: &Drawn| shot.screen.view(drawn.exact).z >= near_m && shot.screen.shows(drawn.exact);
-    vertices.filter(seen).step_by(stride).collect()
+        |drawn: &Drawn| screen.view(drawn.exact).z >= screen.near_m && screen.shows(drawn.exact);
+    vertices.filter(seen).collect()
+}
+
+fn of_shot(measure: &Measure, shot: &Shot<'_>) -> Vec<Drawn> {
+    in_picture((shot.terrain, shot.output), &measure.now.drawn, &shot.screen)
 }
 
 /// M32 − M64 in pixels: of the uploaded bytes alone, and of all f32 arithmetic up to the pixel.
@@ -142,7 +151,7 @@ pub(super) fn arithmetic(measure: &Measure, shot: &Shot<'_>) -> [Spread; 2] {
     let camera = &shot.output.views[0].camera;
     let pipeline = Pipeline::new(shot.terrain.settings(), camera, shot.output.time_ms);
     let (mut bytes, mut whole) = (Vec::new(), Vec::new());
-    for drawn in in_picture(measure, shot, 1) {
+    for drawn in of_shot(measure, shot) {
         let Some(exact) = shot.screen.pixel(drawn.exact) else { continue };
         let place = measure.place_of(drawn.exact.normalize(), exact, shot.frame);
         let stored = pipeline.stored(&drawn.vertex, drawn.morph.as_ref());
@@ -166,24 +175,30 @@ const STEP_PX: f64 = 0.05;
 pub(super) fn jitter(measure: &Measure, shot: &Shot<'_>) -> (Spread, f64) {
     let camera = &shot.output.views[0].camera;
     let pipeline = Pipeline::new(shot.terrain.settings(), camera, shot.output.time_ms);
-    let count = in_picture(measure, shot, 1).len();
     let mut found = Vec::new();
     let mut step_px = 0.0_f64;
-    for drawn in in_picture(measure, shot, count.div_ceil(TREMBLING).max(1)) {
-        let track = track(&drawn, &pipeline, &shot.screen);
-        let mean = track.iter().copied().sum::<DVec2>() / f64::from(STEPS);
-        let squares: f64 = track.iter().map(|error| (*error - mean).length_squared()).sum();
-        let steps = track.windows(2).map(|pair| (pair[1] - pair[0]).length());
-        step_px = steps.fold(step_px, f64::max);
+    let all = of_shot(measure, shot);
+    for drawn in all.iter().step_by(all.len().div_ceil(TREMBLING).max(1)) {
+        let trembles = tremble(drawn, &|eye| pipeline.moved(eye), &shot.screen);
         let pixel = shot.screen.pixel(drawn.exact).unwrap_or_default();
         let place: Where = measure.place_of(drawn.exact.normalize(), pixel, shot.frame);
-        found.push(((squares / f64::from(STEPS)).sqrt(), place));
+        found.push((trembles.rms_px, place));
+        step_px = step_px.max(trembles.step_px);
     }
     (spread_of(&found), step_px)
 }
 
-/// Errors of one vertex' pixel over a slow flight past it.
-fn track(drawn: &Drawn, pipeline: &Pipeline, screen: &Screen) -> Vec<DVec2> {
+/// How one vertex trembles.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Tremble {
+    /// Standard deviation of its error, pixels.
+    pub rms_px: f64,
+    /// Greatest change of its error from one frame to the next, pixels.
+    pub step_px: f64,
+}
+
+/// Flies slowly past a vertex and holds the pixels of f32 against those of f64.
+pub fn tremble(drawn: &Drawn, from: &dyn Fn(DVec3) -> Pipeline, screen: &Screen) -> Tremble {
     let depth_m = screen.view(drawn.exact).z;
     // Aslant, so that no axis stands still.
     let direction = (screen.axes[0] + screen.axes[1] * 0.5).normalize();
@@ -191,8 +206,12 @@ fn track(drawn: &Drawn, pipeline: &Pipeline, screen: &Screen) -> Vec<DVec2> {
     let errors = (0..STEPS).map(|step| {
         let eye = screen.eye + step_m * f64::from(step);
         let exact = Screen { eye, ..*screen }.pixel(drawn.exact).unwrap_or_default();
-        let pipeline = pipeline.moved(eye);
+        let pipeline = from(eye);
         pipeline.pixel(pipeline.view(&drawn.vertex, drawn.morph.as_ref())) - exact
     });
-    errors.collect()
+    let track: Vec<DVec2> = errors.collect();
+    let mean = track.iter().copied().sum::<DVec2>() / f64::from(STEPS);
+    let squares: f64 = track.iter().map(|error| (*error - mean).length_squared()).sum();
+    let steps = track.windows(2).map(|pair| (pair[1] - pair[0]).length());
+    Tremble { rms_px: (squares / f64::from(STEPS)).sqrt(), step_px: steps.fold(0.0, f64::max) }
 }

@@ -3,7 +3,7 @@
 //!
 //! In:    a goal, what points yielded.
 //! Out:   which point; the next limits to try.
-//! Keeps: [`Search`]: what lies on either side of the goal.
+//! Keeps: [`Search`]: how far it went.
 //! Not here: flying what is tried (the host).
 
 use super::yields::Yield;
@@ -74,55 +74,42 @@ pub fn choose(goal: Goal, found: &[Yield]) -> Result<usize, Option<usize>> {
     best.ok_or_else(|| known.min_by(|&a, &b| by(&|y| [goal.of(y), y.triangles], a, b)))
 }
 
-/// A search for the number of triangles that meets a goal: outwards in steps of two until one
-/// does, then by halves on the logarithm between the last that does not and the first that does.
+/// A search for the number of triangles that meets a goal: in steps of √2 away from one that misses
+/// it, some steps at a time, since the ground that points are measured against takes longer to make
+/// than they take to fly. It is over with the first that meets the goal, or without one.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
-    /// Most triangles that were tried on the side that misses and on the side that meets.
-    misses: f64,
-    meets: Option<f64>,
-    /// 2 where more triangles are better, ½ where fewer are.
-    step: f64,
-    left: u32,
+    from: f64,
+    /// Above 1 where more triangles are better, below where fewer are.
+    ratio: f64,
+    taken: u32,
 }
 
-/// Points that a search tries at most.
-const TRIES: u32 = 6;
-/// Neighbours this near to each other, as a ratio, are not told apart.
-const NEAR: f64 = 1.12;
+/// Steps that are tried together.
+const TOGETHER: u32 = 4;
+/// Steps that are tried at most: 16 times the triangles, or a sixteenth.
+const STEPS: u32 = 8;
 
 impl Search {
     /// From a number of triangles that misses the goal.
     pub fn from(goal: Goal, triangles_max: u32) -> Self {
-        let step = if matches!(goal, Goal::ErrorPx(_)) { 2.0 } else { 0.5 };
-        Self { misses: f64::from(triangles_max), meets: None, step, left: TRIES }
+        let root = core::f64::consts::SQRT_2;
+        let ratio = if matches!(goal, Goal::ErrorPx(_)) { root } else { 1.0 / root };
+        Self { from: f64::from(triangles_max), ratio, taken: 0 }
     }
 
-    /// The next to try, within `range`; `None` when the search is over.
-    pub fn next(&self, range: [u32; 2]) -> Option<u32> {
-        let tried = match self.meets {
-            None => self.misses * self.step,
-            Some(meets) => (self.misses * meets).sqrt(),
-        };
-        let [least, most] = range.map(f64::from);
-        let near = self.meets.is_some_and(|meets| {
-            let ratio = meets / self.misses;
-            ratio.max(1.0 / ratio) < NEAR * NEAR
-        });
-        let over = near || self.left == 0 || tried < least || tried > most;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-        let tried = tried.round() as u32;
-        (!over).then_some(tried)
-    }
-
-    /// What the tried one did.
-    pub fn told(&mut self, triangles_max: u32, met: bool) {
-        if met {
-            self.meets = Some(f64::from(triangles_max));
-        } else {
-            self.misses = f64::from(triangles_max);
+    /// The next to try, all within `range`; none when the search is over.
+    pub fn next(&mut self, range: [u32; 2]) -> Vec<u32> {
+        if self.taken >= STEPS {
+            return Vec::new();
         }
-        self.left -= 1;
+        let steps = self.taken + 1..=self.taken + TOGETHER;
+        self.taken += TOGETHER;
+        let tried = steps.map(|step| self.from * libm::pow(self.ratio, f64::from(step)));
+        let inside = tried.filter(|tried| (range[0].into()..=range[1].into()).contains(tried));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
+        let whole = inside.map(|tried| tried.round() as u32);
+        whole.collect()
     }
 }
 
@@ -163,18 +150,14 @@ mod tests {
     }
 
     #[test]
-    fn a_search_closes_in_on_where_the_goal_is_met() {
-        let goal = Goal::ErrorPx(1.0);
-        let mut search = Search::from(goal, 100_000);
-        let mut least_met = u32::MAX;
-        while let Some(tried) = search.next([128, 16_000_000]) {
-            let met = tried >= 310_000;
-            least_met = if met { least_met.min(tried) } else { least_met };
-            search.told(tried, met);
-        }
-        assert!((310_000..360_000).contains(&least_met), "{least_met}");
-        let fewer = Search::from(Goal::BudgetMs(1.0), 100_000);
-        assert_eq!(fewer.next([128, 16_000_000]), Some(50_000));
-        assert_eq!(Search::from(goal, 16_000_000).next([128, 16_000_000]), None);
+    fn a_search_goes_on_in_steps_and_ends() {
+        let (goal, range) = (Goal::ErrorPx(1.0), [128, 16_000_000]);
+        let mut more = Search::from(goal, 100_000);
+        assert_eq!(more.next(range), [141_421, 200_000, 282_843, 400_000]);
+        assert_eq!(more.next(range).last(), Some(&1_600_000));
+        assert_eq!(more.next(range), [0; 0]);
+        let mut fewer = Search::from(Goal::BudgetMs(1.0), 300);
+        assert_eq!(fewer.next(range), [212, 150]);
+        assert_eq!(Search::from(goal, 16_000_000).next(range), [0; 0]);
     }
 }

@@ -151,11 +151,22 @@ pub fn default_sweep() -> SweepSettings {
         vertices: vec![VertexPrecision::TwoFloat, VertexPrecision::EyeF64],
         depth_ranges: vec![vec![], vec![30.0, 1e4]],
         morph_s: vec![0.0, 0.25],
-        pages_mib: vec![16, 64, 256],
+        pages_mib: vec![4, 16, 256],
         loader_delay_ms: vec![0, 200],
         workers: vec![0, 1],
         grid: false,
     }
+}
+
+/// Points by which the laws of error, triangles and tolerance are seen down to few triangles:
+/// leaves that are drawn as four. One that is drawn as sixteen takes them from where they are
+/// needed: below some 1000 leaves a planet is not refined down to the ground.
+pub fn law_points(base: &Point) -> Vec<Point> {
+    let small = base.clone().turned(&Turn::PatchDepth(2));
+    let sizes = [5000, 10_000, 20_000, 50_000, 100_000, 200_000].map(Turn::Triangles);
+    let tolerances = [4.0, 8.0, 16.0, 32.0].map(Turn::Tolerance);
+    let points = sizes.iter().chain(&tolerances).map(|turn| small.clone().turned(turn));
+    points.filter(|point| point.check(base).is_ok()).collect()
 }
 
 /// The points of a sweep, the base first: one knob at a time around it, or every value with every
@@ -238,6 +249,13 @@ mod tests {
         }
         assert_eq!(points[0].name(&base), "the scene as it is");
         assert_eq!(points[1].name(&base), "tolerance_px 2.0");
+    }
+
+    #[test]
+    fn laws_are_seen_by_small_leaves() {
+        let points = law_points(&base());
+        assert_eq!(points.len(), 10);
+        assert!(points.iter().all(|point| point.scene.lod.patch_depth == 2));
     }
 
     #[test]

@@ -33,9 +33,10 @@ const MET: f64 = 1.05;
 const FULL: f64 = 0.95;
 
 impl Yield {
-    /// The tolerance decides how fine the mesh is: every measured frame met it.
+    /// The tolerance decides how fine the mesh is: no measured frame had all triangles that it
+    /// may. (Pages that are not there yet, and the deepest level, can end refinement before.)
     pub fn tolerance_decides(&self) -> bool {
-        self.bound_px <= MET * self.tolerance_px
+        self.triangles_span[1] < FULL * self.triangles_max
     }
 
     /// The number of triangles decides: every measured frame had as many as it may.
@@ -43,16 +44,25 @@ impl Yield {
         self.triangles_span[0] >= FULL * self.triangles_max
     }
 
-    /// What a scene can promise: the measured error, and where the tolerance decides the bound,
-    /// which then holds wherever the flight goes.
+    /// The bound of every measured frame was within the tolerance.
+    pub fn meets_tolerance(&self) -> bool {
+        self.bound_px <= MET * self.tolerance_px
+    }
+
+    /// What a scene can promise: the measured error; and where the tolerance decides and is met,
+    /// the bound, which then holds wherever the flight goes.
     pub fn promise_px(&self) -> f64 {
-        if self.tolerance_decides() { self.error_px.max(self.bound_px) } else { self.error_px }
+        if self.tolerance_decides() && self.meets_tolerance() {
+            self.error_px.max(self.bound_px)
+        } else {
+            self.error_px
+        }
     }
 }
 
 /// One value for the flight of a metric that has one each measured frame. What is called `rms` is
-/// the root of the mean square, `p50`, `tightness` and what is called `mean` the mean, all else
-/// the greatest: so that `p999` is that of the worst frame. NaN, what a frame has none of, is left
+/// the root of the mean square, `p50`, `median`, `tightness` and `mean` the mean, all else the
+/// greatest: so that `p999` is that of the worst frame. NaN, what a frame has none of, is left
 /// out; without any frame it is NaN.
 pub fn fold(name: &str, values: &[f64]) -> f64 {
     let told: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
@@ -64,7 +74,7 @@ pub fn fold(name: &str, values: &[f64]) -> f64 {
     if has("rms") {
         return mean(|x| x * x).sqrt();
     }
-    if has("p50") || has("mean") || has("tightness") {
+    if ["p50", "median", "mean", "tightness"].into_iter().any(has) {
         return mean(|x| x);
     }
     told.into_iter().fold(f64::NEG_INFINITY, f64::max)
@@ -100,5 +110,8 @@ mod tests {
         let full = Yield { bound_px: 9.0, triangles_span: [9.6e4, 1e5], ..free };
         assert!(!full.tolerance_decides() && full.budget_decides());
         assert_eq!(full.promise_px(), 0.4);
+        let late = Yield { bound_px: 9.0, ..free };
+        assert!(late.tolerance_decides() && !late.meets_tolerance());
+        assert_eq!(late.promise_px(), 0.4, "a bound that was not met is no promise");
     }
 }

@@ -40,7 +40,7 @@ pub struct Flying {
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
     pub size: [u32; 2],
     /// Cells of the reference ground look no larger than this, in pixels.
-    #[arg(long, value_name = "PX", default_value_t = 1.0)]
+    #[arg(long, value_name = "PX", default_value_t = 1.0, value_parser = cell)]
     pub cell_px: f64,
     /// Timing passes of each point, 1 to 99, in shuffled order between the points.
     #[arg(long, value_name = "N", default_value_t = 3,
@@ -55,6 +55,13 @@ fn positive(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count @ 1..) => Ok(count),
         _ => Err(format!("`{text}` is not a whole number from 1")),
+    }
+}
+
+fn cell(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(px) if (0.1..=100.0).contains(&px) => Ok(px),
+        _ => Err(format!("`{text}` is not a number from 0.1 to 100")),
     }
 }
 
