@@ -85,19 +85,20 @@ impl Tour {
     }
 }
 
-/// Flies all of a flight and audits every hundredth frame.
+/// Flies all of a flight and audits every two hundredth frame.
 fn closed_all_the_way(flight: &str) {
     let mut tour = Tour::new(flight, "earth", 0);
-    let mut audited = 0;
+    let (mut audited, mut most) = (0, 0);
     for index in 0..tour.flight.poses.len() {
         tour.frame(index, false);
-        if index % 100 == 0 {
+        most = most.max(tour.output.counts.triangles);
+        if index % 200 == 0 {
             tour.overfly.terrain().audit().unwrap_or_else(|what| panic!("frame {index}: {what}"));
             audited += 1;
         }
     }
-    assert!(audited > 100);
-    assert!(tour.output.counts.triangles > 50_000, "{:?}", tour.output.counts);
+    assert!(audited > 50);
+    assert!(most > 50_000, "{most}");
 }
 
 #[test]
@@ -119,7 +120,7 @@ fn the_surface_is_closed_all_along_poles() {
 fn worker_counts_do_not_change_a_bit() {
     for (flight, scene) in [("rainier", "earth"), ("descent", "moon"), ("poles", "small")] {
         let digests = [0, 1, 2, 4]
-            .map(|workers| Tour::new(flight, scene, workers).digest_of((0..6000).step_by(25)));
+            .map(|workers| Tour::new(flight, scene, workers).digest_of((0..6000).step_by(50)));
         assert_eq!(digests, [digests[0]; 4], "{flight} over {scene}");
     }
 }

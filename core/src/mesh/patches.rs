@@ -223,7 +223,7 @@ impl Patches {
     /// Where the vertices of one slot begin; empty where the scene does not morph.
     pub fn morphs_of(&self, slot: u32) -> &[PatchMorph] {
         let n = self.vertices_per_patch as usize;
-        self.morphs.get(slot as usize * n..).map_or(&[], |morphs| &morphs[..n])
+        self.morphs.get(slot as usize * n..).and_then(|morphs| morphs.get(..n)).unwrap_or(&[])
     }
 }
 

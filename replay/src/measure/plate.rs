@@ -207,25 +207,18 @@ impl Plate {
                 continue;
             }
             if bits == LEAF_BITS {
-                if let Some(found) = self.meet_square((from, direction), (x, y), until) {
-                    until = found.t;
-                    best = Some(found);
-                }
+                best = self.meet_square((from, direction), (x, y), until).or(best);
+                until = best.map_or(until, |found| found.t);
                 continue;
             }
             let first = count;
             for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                 let (x, y) = (2 * x + dx, 2 * y + dy);
-                let around = &self.boxes[place(bits + 1, x, y)];
-                let Some(t) = around.entry(from, per, until) else { continue };
+                let entry = self.boxes[place(bits + 1, x, y)].entry(from, per, until);
                 // The nearest lies on top.
-                let mut at = count;
-                while at > first && stack[at - 1].0 < t {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = (t, bits + 1, x, y);
-                count += 1;
+                stack[count] = (entry.unwrap_or(f64::INFINITY), bits + 1, x, y);
+                count += usize::from(entry.is_some());
+                sink(&mut stack[first..count]);
             }
         }
         best
@@ -243,20 +236,26 @@ impl Plate {
         for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let (i, j) = (2 * x + dx, 2 * y + dy);
             for corners in self.triangles(i, j) {
-                let places = corners.map(|(i, j)| self.at(i, j));
-                if let Some((t, weights)) = meet_triangle(from, direction, places, until) {
-                    until = t;
-                    best = Some(Meeting { t, corners, weights });
-                }
+                best = self.meet_corners((from, direction), corners, until).or(best);
+                until = best.map_or(until, |found| found.t);
             }
             for edge in self.border(i, j).into_iter().flatten() {
-                if let Some(found) = self.meet_skirt((from, direction), edge, until) {
-                    until = found.t;
-                    best = Some(found);
-                }
+                best = self.meet_skirt((from, direction), edge, until).or(best);
+                until = best.map_or(until, |found| found.t);
             }
         }
         best
+    }
+
+    fn meet_corners(
+        &self,
+        (from, direction): (DVec3, DVec3),
+        corners: [(usize, usize); 3],
+        end: f64,
+    ) -> Option<Meeting> {
+        let places = corners.map(|(i, j)| self.at(i, j));
+        let (t, weights) = meet_triangle(from, direction, places, end)?;
+        Some(Meeting { t, corners, weights })
     }
 
     /// Both triangles of a cell.
@@ -305,6 +304,16 @@ impl Plate {
             (t, weights[0] + weights[2])
         };
         Some(Meeting { t, corners: [a, b, a], weights: [1.0 - along, along, 0.0] })
+    }
+}
+
+/// Moves the last of a falling list to its place.
+fn sink(list: &mut [(f64, u8, usize, usize)]) {
+    for at in (1..list.len()).rev() {
+        if list[at - 1].0 >= list[at].0 {
+            return;
+        }
+        list.swap(at - 1, at);
     }
 }
 

@@ -67,18 +67,17 @@ impl Raster {
         }
         let sides = [b.cross(c), c.cross(a), a.cross(b)];
         let volume = a.dot(sides[0]);
-        for row in span.rows[0]..span.rows[1] {
-            for column in span.columns[0]..span.columns[1] {
-                let ray = screen.tangents(grid.pixel(column, row));
-                let [u, v, w] = sides.map(|side| ray.dot(side));
-                let inside =
-                    (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-                let depth_m = volume / (u + v + w);
-                let at = row as usize * grid.columns as usize + column as usize;
-                if inside && depth_m >= screen.near_m && depth_m < self.depth_m[at] {
-                    self.depth_m[at] = depth_m;
-                    self.leaf[at] = leaf;
-                }
+        let rows = span.rows[0]..span.rows[1];
+        let columns = || span.columns[0]..span.columns[1];
+        for (row, column) in rows.flat_map(|row| columns().map(move |column| (row, column))) {
+            let ray = screen.tangents(grid.pixel(column, row));
+            let [u, v, w] = sides.map(|side| ray.dot(side));
+            let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+            let depth_m = volume / (u + v + w);
+            let at = row as usize * grid.columns as usize + column as usize;
+            if inside && depth_m >= screen.near_m && depth_m < self.depth_m[at] {
+                self.depth_m[at] = depth_m;
+                self.leaf[at] = leaf;
             }
         }
     }

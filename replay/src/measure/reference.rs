@@ -108,26 +108,29 @@ impl Reference {
             }
             let horizon = Horizon::new(&self.body, [floor_m.max(-0.5 * self.body.b_m()), 0.0]);
             for key in &wave {
-                // A page that cannot be made is stood in for by its parent.
-                let found = self.plates.get_mut(key).map(|kept| {
-                    kept.used = self.frame;
-                    kept.plate.clone()
-                });
-                let Some(plate) = found else {
-                    let parent = key.parent().and_then(|parent| self.plates.get(&parent));
-                    let stand_in = parent.map(|kept| kept.plate.clone());
-                    stand_in.into_iter().for_each(|plate| self.show(plate, screen));
-                    continue;
-                };
-                if !self.split(&plate, (screen, &horizon), &mut next) {
-                    self.show(plate, screen);
-                }
+                self.show_or_split(*key, (screen, &horizon), &mut next);
             }
             wave = next;
         }
         self.shown.sort_by(|a, b| a.nearest_m.total_cmp(&b.nearest_m));
         let oldest = self.frame.saturating_sub(IDLE_FRAMES);
         self.plates.retain(|_, kept| kept.used >= oldest);
+    }
+
+    /// Shows a plate, or finds its children where it is too coarse. A page that cannot be made is
+    /// stood in for by its parent.
+    fn show_or_split(&mut self, key: PageKey, eyes: (&Screen, &Horizon), next: &mut Vec<PageKey>) {
+        let Some(kept) = self.plates.get_mut(&key) else {
+            let parent = key.parent().and_then(|parent| self.plates.get(&parent));
+            let stand_in = parent.map(|kept| kept.plate.clone());
+            stand_in.into_iter().for_each(|plate| self.show(plate, eyes.0));
+            return;
+        };
+        kept.used = self.frame;
+        let plate = kept.plate.clone();
+        if !self.split(&plate, eyes, next) {
+            self.show(plate, eyes.0);
+        }
     }
 
     /// Whether a plate is too coarse for where it lies; then its children are due.

@@ -3,7 +3,7 @@
 //! In:    a frame that was just measured.
 //! Out:   [`Thorough`].
 //! Keeps: nothing.
-//! Not here: each metric itself (the modules named in [`measure`]).
+//! Not here: each metric itself (`outline`, `cracks`, `heights`, `pipeline`, `depth`, `cross`).
 
 use super::errors::Thorough;
 use super::frame::Measure;
