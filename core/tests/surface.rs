@@ -103,7 +103,7 @@ fn the_deepest_level_is_kept_and_its_error_is_told() {
 #[test]
 fn several_views_refine_for_each_of_them() {
     let mut settings = scene(4, 400_000);
-    settings.lod.tolerance.0 = 100.0;
+    settings.lod.tolerance.0 = 10.0;
     let views = [
         view(&EARTH, at(20.0, 30.0, 9_000.0), 40.0, -20.0),
         view(&EARTH, at(20.0, 30.0, 9_000.0), 220.0, -20.0),

@@ -32,7 +32,7 @@ use glam::IVec3;
 pub fn surprise(style: Style) -> f64 {
     match style {
         Style::Earthlike => 2.0,
-        Style::Cratered => 5.0,
+        Style::Cratered => 8.0,
     }
 }
 

@@ -26,6 +26,7 @@ use crate::mesh::drape::{Drape, NewTile, PatchDrape};
 use crate::mesh::morph::{Moment, Morphing};
 use crate::mesh::patches::Patches;
 use crate::mesh::place::{self, BLOCK_GRAIN, LIST_GRAIN, Placed, empty_draws, place_blocks};
+use crate::mesh::unrest::Unrest;
 use crate::settings::SceneSettings;
 use overfly_jobs::{ArithmeticFault, Graph, Span, StageId, Team, check_arithmetic};
 use parking_lot::{Mutex, RwLock, RwLockReadGuard};
@@ -106,6 +107,7 @@ pub struct Terrain {
     lod: RwLock<Lod>,
     patches: RwLock<Patches>,
     build_blocks: Mutex<Vec<BuildBlock>>,
+    unrest: Mutex<Unrest>,
     placed: Mutex<Vec<Placed>>,
     output: Mutex<FrameOutput>,
 }
@@ -154,6 +156,7 @@ impl Terrain {
                 sights: Vec::new(),
                 judges_all: false,
             }),
+            unrest: Mutex::new(Unrest::new(limits.leaves, morphs)),
             build_blocks: Mutex::new(BuildBlock::for_patches(
                 limits.built,
                 patches.vertices_per_patch,
@@ -378,6 +381,7 @@ fn refine_surface(terrain: &Terrain) {
     if terrain.input.lock().hold_lod {
         let patch_depth = terrain.settings.lod.patch_depth;
         count(&mut output.counts, mesh, &Refinement::default(), patch_depth);
+        cover.young_px = 0.0;
         output.digest.mesh = cover.digest();
         return;
     }
@@ -414,9 +418,7 @@ fn refine_surface(terrain: &Terrain) {
     count(&mut output.counts, mesh, &done, terrain.settings.lod.patch_depth);
     if let Some(morphing) = &terrain.morphing {
         let now = (output.time_ms, morphing.duration_ms);
-        let morphing_px = planet.cover.morphing_px(&mesh.diamonds, planet.sights, now);
-        let bound_px = &mut output.counts.error_px_bound;
-        *bound_px = if morphing_px > *bound_px { morphing_px } else { *bound_px };
+        planet.cover.look_at_young(&mesh.diamonds, planet.sights, now);
     }
     output.counts.wanted = u32::try_from(output.wanted.len()).expect("a bounded list");
     output.digest.mesh = planet.cover.digest();
@@ -442,7 +444,7 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     output.built.clear();
     patches.drain_fresh(&mut output.built);
     let SceneSettings { body, sea, .. } = &terrain.settings;
-    let Lod { mesh, cover, .. } = &*lod;
+    let Lod { mesh, cover, sights, .. } = &*lod;
     let diamonds = &mesh.diamonds;
     let now_ms = output.time_ms;
     let moment = terrain.morphing.as_ref().map(|morphing| Moment { morphing, now_ms });
@@ -456,6 +458,15 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
         build_block(&ground, &patches, &slots[from..to], &mut chunk[0]);
     });
     store(&mut patches, slots, used);
+    if let Some(morphing) = &terrain.morphing {
+        let mut unrest = terrain.unrest.lock();
+        unrest.add(slots);
+        let unrest_px = unrest.error_px(&patches, cover, sights, (now_ms, morphing.duration_ms));
+        // Both bound what is drawn of splits that still morph.
+        let least_px = if unrest_px < cover.young_px { unrest_px } else { cover.young_px };
+        let bound_px = &mut output.counts.error_px_bound;
+        *bound_px = if least_px > *bound_px { least_px } else { *bound_px };
+    }
     output.counts.built = u32::try_from(slots.len()).expect("slots are counted in u32");
     if let Some(drape) = &mut *terrain.drape.lock() {
         drape_over(drape, (&mut patches, &ground), output);

@@ -20,10 +20,6 @@ use crate::mesh::patches::{Leaf, Patches};
 use crate::settings::LodSettings;
 use glam::IVec3;
 
-/// At most this share of a triangle's error is left where it is halved: a half on smooth ground,
-/// 0.71 at a crease.
-const FINER: f64 = 0.75;
-
 /// What the planet hangs on each diamond; meaningless for free records.
 pub struct Cover {
     /// Bounds of the diamond and all its descendants; read by every verdict.
@@ -37,6 +33,8 @@ pub struct Cover {
     pub split_ms: Column<Diamond, u32>,
     /// Diamonds whose split still morphs, as far as is known, and when that began.
     young: Vec<(DiamondId, u32)>,
+    /// The greatest error of those in pixels, in the views of the last frame.
+    pub young_px: f64,
     digest: u64,
 }
 
@@ -49,25 +47,26 @@ impl Cover {
             patches: Column::new(capacity, || [None; 2]),
             split_ms: Column::new(if morphs { capacity } else { 0 }, || 0),
             young: Vec::with_capacity(if morphs { capacity as usize } else { 0 }),
+            young_px: 0.0,
             digest: 0,
         }
     }
 
-    /// The greatest error in pixels of a diamond whose split still morphs at `now_ms`: what is
-    /// drawn lies between its triangles and finer ones. Forgets those that have arrived or merged.
-    pub fn morphing_px(
+    /// Works out [`Self::young_px`] at `now_ms`: what is drawn lies between the triangles of young
+    /// diamonds and finer ones. Forgets those that have arrived or merged.
+    pub fn look_at_young(
         &mut self,
         diamonds: &Diamonds,
         sights: &[Sight],
         (now_ms, morph_ms): (u32, u32),
-    ) -> f64 {
+    ) {
         let Self { young, split_ms, region, .. } = self;
         young.retain(|&(id, since_ms)| {
             let is_same = diamonds[id].is_split() && split_ms[id] == since_ms;
             is_same && now_ms.wrapping_sub(since_ms) < morph_ms
         });
         let errors_px = young.iter().map(|&(id, _)| priority_px(&region[id], sights));
-        errors_px.fold(0.0, |most, px| if px > most { px } else { most })
+        self.young_px = errors_px.fold(0.0, |most, px| if px > most { px } else { most });
     }
 
     /// Sum of the hashes of all leaf triangles.
@@ -276,7 +275,8 @@ impl Planet<'_> {
             let is_first = level.is_multiple_of(2) == (self.lod.patch_depth == 0);
             error_m = if level.is_multiple_of(2) { even_m } else { odd_m };
             let second_m = if self.lod.patch_depth == 0 { odd_m } else { even_m };
-            finer_m = if is_first { second_m } else { FINER * second_m };
+            // Below its second level the page knows of nothing that is less: a needle stays one.
+            finer_m = if is_first { second_m } else { error_m };
         }
         for parent in record.parents().into_iter().flatten() {
             let outer = &self.cover.region[parent];

@@ -13,5 +13,6 @@ pub mod morph;
 pub mod patches;
 pub mod place;
 pub mod topology;
+pub mod unrest;
 
 pub use patches::{PatchMorph, PatchVertex, Patches};
