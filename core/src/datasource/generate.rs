@@ -10,7 +10,7 @@ use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, ho
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
 use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
-use super::probes::{Findings, Probes, Site, surprise};
+use super::probes::{Findings, HIDDEN, Probes, Site, surprise};
 use super::procedural::detail::Detail;
 use super::procedural::{Planet, Style};
 use super::tile::Tile;
@@ -190,9 +190,12 @@ impl Generator {
             });
             let bound = &mut page.bounds[j * BOUND_SIDE + i];
             let min = |a: f32, b: f32| if b < a { b } else { a };
+            let error = |octaves_m: f32, seen_m: f32| {
+                min(octaves_m, seen_m + narrow(HIDDEN * f64::from(octaves_m)))
+            };
             *bound = Bound {
-                error_odd_m: min(bound.error_odd_m, seen.error_odd_m),
-                error_even_m: min(bound.error_even_m, seen.error_even_m),
+                error_odd_m: error(bound.error_odd_m, seen.error_odd_m),
+                error_even_m: error(bound.error_even_m, seen.error_even_m),
                 variation_m: min(bound.variation_m, seen.variation_m),
             };
         }
