@@ -31,6 +31,10 @@ enum Command {
     View(cli::view::Arguments),
     /// Measures how far what is drawn strays from the ground, over a flight.
     Measure(cli::measure::Arguments),
+    /// Holds a flight's frames against a budget, a baseline or another program, as in CI.
+    Budget(Box<cli::budget::Arguments>),
+    /// Says what differs between two runs of `budget`: speed, work or result, and where first.
+    Diff(cli::budget::DiffArguments),
     /// Sweeps the knobs of a scene over a flight: what each costs, and what it buys.
     Trade(cli::trade::Arguments),
     /// Writes the scene to take for a stated error or a stated budget, and tries it.
@@ -41,6 +45,8 @@ enum Command {
     Probe(cli::probe::Arguments),
     /// Builds an archive of real elevation from GeoTIFF, SRTM or PNG.
     Ingest(cli::ingest::Arguments),
+    /// Makes a flight of a recording in another format: IGC, GPX, KML, X-Plane, Tacview, NMEA, ADS-B.
+    Import(cli::import::Arguments),
     /// Shows what this machine has and lacks: Vulkan devices, layers, cores.
     Doctor,
 }
@@ -58,11 +64,14 @@ fn main() -> ExitCode {
         Command::Still(arguments) => cli::still::run(&arguments),
         Command::View(arguments) => cli::view::run(&arguments),
         Command::Measure(arguments) => cli::measure::run(&arguments),
+        Command::Budget(arguments) => cli::budget::run(&arguments),
+        Command::Diff(arguments) => cli::budget::run_diff(&arguments),
         Command::Trade(arguments) => cli::trade::run(&arguments),
         Command::Recommend(arguments) => cli::trade::recommend::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
         Command::Probe(arguments) => cli::probe::run(&arguments),
         Command::Ingest(arguments) => cli::ingest::run(&arguments),
+        Command::Import(arguments) => cli::import::run(&arguments),
         Command::Doctor => Ok(cli::doctor::run()),
     };
     outcome.unwrap_or_else(|error| {

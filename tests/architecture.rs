@@ -8,7 +8,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const FOLDERS: [&str; 11] = [
+const FOLDERS: [&str; 12] = [
     "src",
     "core",
     "jobs",
@@ -17,6 +17,7 @@ const FOLDERS: [&str; 11] = [
     "replay",
     "archive",
     "ingest",
+    "tracks",
     "xtask",
     "tests",
     "benches",
@@ -54,6 +55,7 @@ fn crates_name_only_the_crates_below_them() {
         ("replay", vec!["overfly-core", "overfly-jobs", "overfly-config"]),
         ("archive", vec!["overfly-core", "overfly-jobs"]),
         ("ingest", vec!["overfly-core", "overfly-archive"]),
+        ("tracks", vec!["overfly-core", "overfly-replay"]),
         ("xtask", vec![]),
     ];
     for (folder, below) in allowed {

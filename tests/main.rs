@@ -8,6 +8,7 @@
 mod architecture;
 mod contracts {
     mod archives;
+    mod budgets;
     mod command_line;
     mod cracks;
     mod depths;
@@ -15,6 +16,7 @@ mod contracts {
     mod flights;
     mod grounds;
     mod hills;
+    mod importing;
     mod measuring;
     mod pictures;
     mod probing;

@@ -8,6 +8,7 @@
 //! The presets document the format: `presets/earth.ron` spells out every setting.
 #![forbid(unsafe_code)]
 
+mod budget;
 mod depth;
 mod fault;
 mod fields;
@@ -20,6 +21,7 @@ mod tree;
 mod utc;
 mod write;
 
+pub use budget::{BudgetLine, BudgetNames, BudgetSettings, Severity, Statistic, read_budget};
 pub use fault::{Fault, FaultKind, LoadError, SceneFaults};
 pub use overfly_core::settings::SceneSettings;
 pub use sweep::{SweepSettings, read_sweep};

@@ -8,6 +8,7 @@
 //! | [`flight`](mod@flight) | flights in memory, and the three that come with overfly |
 //! | [`resample`] | flights from CSV files of a flight simulator |
 //! | [`measure`](mod@measure) | errors of what is drawn, in pixels and metres |
+//! | [`budget`] | what frames may cost: runs, lines, verdicts, two programs in pairs |
 //! | [`trade`] | the price of every knob: points, fronts, slopes, advice |
 //! | [`compare`], [`stats`] | which stage differs first; percentiles of columns |
 //!
@@ -17,6 +18,7 @@
 //! Not here: running a scene (the host), what a frame is (`overfly_core`).
 #![forbid(unsafe_code)]
 
+pub mod budget;
 pub mod compare;
 pub mod flight;
 pub mod format;

@@ -27,6 +27,7 @@ use overfly_replay::measure::pipeline::{Pipeline, in_picture, tremble};
 use overfly_replay::measure::screen::Screen;
 use overfly_replay::measure::{FlightErrors, Measure, MeasureSettings, cracks};
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 /// A terrain that has come up before one view.
@@ -100,12 +101,22 @@ impl Stand {
     }
 
     fn errors_of(&self, rays: u32, spoil: impl FnOnce(&mut MeshThen, &Measure)) -> FlightErrors {
+        self.errors_on(1, rays, spoil)
+    }
+
+    fn errors_on(
+        &self,
+        threads: usize,
+        rays: u32,
+        spoil: impl FnOnce(&mut MeshThen, &Measure),
+    ) -> FlightErrors {
         let make = |key: PageKey| -> Option<Arc<Page>> {
             let mut pages = self.pages.lock().unwrap();
             Some(pages.entry(key).or_insert_with(|| self.generator.page(key)).clone())
         };
         let settings = MeasureSettings {
             rays,
+            threads,
             thorough_every: 1,
             cross_every: 2,
             ..MeasureSettings::default()
@@ -121,6 +132,18 @@ impl Stand {
         measure.judge(frame, 1, &make, &mut flight);
         flight
     }
+}
+
+#[test]
+fn any_number_of_threads_measures_the_same_and_a_stopped_frame_is_none() {
+    let stand = stand(scene(3000, 1.0), 30.0, -10.0);
+    let [one, four] = [1, 4].map(|threads| stand.errors_on(threads, 4000, |_, _| {}).frames);
+    assert_eq!(format!("{one:?}"), format!("{four:?}"));
+    let mut measure = Measure::new(&stand.terrain, MeasureSettings::default());
+    measure.stop_on(Arc::new(AtomicBool::new(true)));
+    let (frame, mut flight) = ((&stand.terrain, &stand.output), FlightErrors::default());
+    assert!(!measure.frame(frame, 0, &|key| Some(stand.generator.page(key)), &mut flight));
+    assert!(flight.frames.is_empty());
 }
 
 /// Limits that a sound frame of these tests keeps, by name in the metric vector.

@@ -11,6 +11,7 @@ use overfly::Overfly;
 use overfly::core::datasource::PageKey;
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
+use overfly::jobs::now_ns;
 use overfly::loader::Loader;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,6 +27,10 @@ pub struct Flown {
     pub source: Source,
     /// The last frame's.
     pub output: FrameOutput,
+    /// How long the last frame took, in nanoseconds; waiting for its pages is not part of it.
+    pub frame_ns: u64,
+    /// The same of each frame of the last lead-in.
+    pub lead_in_ns: Vec<u64>,
     scene: SceneSettings,
     input: FrameInput,
     loader: Loader,
@@ -60,6 +65,8 @@ impl Flown {
             size_px: source.size_px().unwrap_or(manner.size_px),
             source,
             output: FrameOutput::default(),
+            frame_ns: 0,
+            lead_in_ns: Vec::new(),
             scene: scene.clone(),
             input: FrameInput::default(),
             loader,
@@ -73,11 +80,13 @@ impl Flown {
     pub fn lead_in(&mut self, first: usize, stop: &AtomicBool) -> Result<bool, Failure> {
         let recorded = self.source.lead_in();
         let is_recording = matches!(self.source, Source::Recording(_));
+        self.lead_in_ns.clear();
         for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
             if stop.load(Ordering::Relaxed) {
                 return Ok(false);
             }
             self.run(if is_recording { index } else { first }, !is_recording)?;
+            self.lead_in_ns.push(self.frame_ns);
             let c = &self.output.counts;
             let idle = c.splits + c.merges + c.wanted == 0;
             if !is_recording && c.leaves > 0 && idle && self.coming.is_empty() {
@@ -92,6 +101,16 @@ impl Flown {
         self.run(index + self.source.lead_in(), false)
     }
 
+    /// Time of the last frame's input in seconds.
+    pub fn time_s(&self) -> f64 {
+        self.input.time_s
+    }
+
+    /// Pages on their way to the terrain.
+    pub fn queue_depth(&self) -> usize {
+        self.coming.len()
+    }
+
     fn run(&mut self, played: usize, held: bool) -> Result<(), Failure> {
         self.source.fill(played, &self.scene, self.size_px, &mut self.input);
         if held {
@@ -99,7 +118,9 @@ impl Flown {
         }
         let arriving = self.arriving(played);
         self.loader.fetch(&arriving, &mut self.input.arrived);
+        let begin_ns = now_ns();
         self.overfly.frame(&mut self.input, &mut self.output)?;
+        self.frame_ns = now_ns() - begin_ns;
         Ok(())
     }
 

@@ -214,10 +214,12 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
     let asked = stop.clone();
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))?;
     let mut measure = Measure::new(flown.overfly.terrain(), facts.settings);
+    measure.stop_on(stop.clone());
     let mut errors = FlightErrors::default();
     let mut worst: Option<Worst> = None;
     let sources = flown.overfly.sources().clone();
-    let make = |key| sources.page(key).ok();
+    // A page takes long enough to be waited for after Ctrl-C.
+    let make = |key| if stop.load(Ordering::Relaxed) { None } else { sources.page(key).ok() };
     let style = "{bar:40} {pos}/{len} frames, {eta} left; E1 {msg}";
     let bar = ProgressBar::new(facts.frames.len() as u64)
         .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
@@ -231,7 +233,10 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
         let (terrain, output) = (flown.overfly.terrain(), &flown.output);
         let left = (index - facts.frames.start) % facts.every;
         if left == 0 && !output.views.is_empty() {
-            measure.frame((terrain, output), index as u64, &make, &mut errors);
+            if !measure.frame((terrain, output), index as u64, &make, &mut errors) {
+                facts.interrupted = true;
+                break;
+            }
             let frame = errors.frames.last().expect("just measured");
             bar.set_message(format!("{:.3} px of {:.3}", frame.e1_px.max, frame.bound_px));
             if worst.as_ref().is_none_or(|worst| worst.frame.e1_px.max < frame.e1_px.max) {

@@ -14,10 +14,12 @@ macro_rules! say {
 }
 
 pub mod answers;
+pub mod budget;
 pub mod check;
 pub mod columns;
 pub mod doctor;
 pub mod flown;
+pub mod import;
 pub mod ingest;
 pub mod json;
 pub mod measure;
@@ -55,6 +57,7 @@ Examples:
   overfly still --at 46.85,-121.76,5000 --look 40,-8 -o rainier.png
   overfly replay poles --no-render --record poles.ovf --loader-delay-ms 50
   overfly replay poles.ovf --no-render --workers 0
+  overfly replay flight.igc
   overfly probe --at 46.8523,-121.7603";
 
 /// What ends a command early, in words for the user.

@@ -23,7 +23,7 @@ use std::process::ExitCode;
 /// What `replay` takes.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// A bundled flight (rainier, descent, poles) or an .ovf file.
+    /// A bundled flight (rainier, descent, poles), an .ovf file or one that `import` reads.
     flight: String,
     /// A scene file or a preset (earth, moon, small). A recording brings its own.
     #[arg(long)]

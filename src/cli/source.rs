@@ -1,21 +1,24 @@
 //! What a replay plays: a flight, whose frames are computed, or a recording, whose frames are held
 //! against what was recorded.
 //!
-//! In:    a bundled flight's name or an `.ovf` file.
+//! In:    a bundled flight's name, an `.ovf` file, or a flight recorded by another program.
 //! Out:   [`Source`], frame by frame.
 //! Keeps: all poses or recorded frames in memory.
 //! Not here: the file format (`overfly::replay`).
 
-use super::Failure;
+use super::{Failure, import};
 use overfly::Overfly;
 use overfly::core::datasource::PageKey;
 use overfly::core::digest::FrameDigest;
 use overfly::core::frame::FrameInput;
 use overfly::core::settings::SceneSettings;
+use overfly::replay::format::MAGIC;
 use overfly::replay::{
     self, BUNDLED, Difference, Ending, Flight, Header, Kind, Reader, RecordedFrame, Recording,
     view_of,
 };
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// What is played.
@@ -31,13 +34,32 @@ pub fn recording_header(name: &str) -> Result<Option<Header>, Failure> {
     if BUNDLED.contains(&name) {
         return Ok(None);
     }
-    let path = Path::new(name);
+    let (path, _) = import::split(name);
     if !path.exists() {
         let bundled = BUNDLED.join(", ");
         return Err(format!("`{name}` is neither a file nor a bundled flight ({bundled})").into());
     }
+    if is_foreign(path) {
+        return Ok(None);
+    }
     let reader = Reader::open(path)?;
     Ok((reader.header().kind == Kind::Recording).then(|| reader.header().clone()))
+}
+
+/// Whether a file is none of overfly's own: it begins otherwise and is not called so.
+fn is_foreign(path: &Path) -> bool {
+    let mut begins = [0; MAGIC.len()];
+    let own_name = path.extension().is_some_and(|ending| ending == "ovf");
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut begins));
+    !own_name && path.is_file() && (read.is_err() || begins != MAGIC)
+}
+
+/// A flight in a file, overfly's own or another program's, with how the file ends.
+pub fn flight_of(name: &str) -> Result<(Flight, Ending), Failure> {
+    if is_foreign(import::split(name).0) {
+        return Ok((import::flight(name)?, Ending::Complete));
+    }
+    Ok(Flight::read(Path::new(name))?)
 }
 
 /// Refuses a recording that differs from what is at hand.
@@ -57,7 +79,7 @@ impl Source {
         }
         match recording_header(name)? {
             None => {
-                let (flight, ending) = Flight::read(Path::new(name))?;
+                let (flight, ending) = flight_of(name)?;
                 Ok(Self::Flight(flight, ending))
             }
             Some(header) => {

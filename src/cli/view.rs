@@ -27,8 +27,8 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// A bundled flight (rainier, descent, poles) or an .ovf file to follow. Without one, or with
-    /// --at, the eye is free.
+    /// A bundled flight (rainier, descent, poles), an .ovf file or one that `import` reads,
+    /// to follow. Without one, or with --at, the eye is free.
     flight: Option<String>,
     /// A scene file or a preset (earth, moon, small). [default: the recording's own, else earth]
     #[arg(long)]

@@ -1,12 +1,12 @@
 //! What a flight or a recording shows, frame by frame.
 //!
-//! In:    a bundled flight's name or an `.ovf` file; a scene.
+//! In:    a bundled flight's name, an `.ovf` file or one that `import` reads; a scene.
 //! Out:   [`Track`]: a view for each frame.
 //! Keeps: all views in memory.
 //! Not here: which frame is shown (`play`), held digests (`cli::source`).
 
 use crate::cli::Failure;
-use crate::cli::source::recording_header;
+use crate::cli::source::{flight_of, recording_header};
 use overfly::Overfly;
 use overfly::core::camera::View;
 use overfly::core::settings::SceneSettings;
@@ -35,7 +35,7 @@ impl Track {
         } else if recording_header(name)?.is_some() {
             Self::of_recording(Recording::open(Path::new(name))?)
         } else {
-            Self::of_flight(&Flight::read(Path::new(name))?.0, scene)
+            Self::of_flight(&flight_of(name)?.0, scene)
         };
         if track.views.is_empty() {
             return Err(format!("{name} holds no frame that can be shown").into());

@@ -5,7 +5,8 @@
 //! Keeps: nothing.
 //! Not here: the ground (`reference`), which rays a frame casts (`rays`).
 
-use super::reference::{Hit, Nearby, Reference};
+use super::nearby::Nearby;
+use super::reference::{Hit, MakePage, Reference};
 use super::screen::Screen;
 use glam::{DVec2, DVec3};
 
@@ -16,18 +17,19 @@ pub struct Caster<'a> {
     pub reference: &'a Reference,
     /// The projection.
     pub screen: &'a Screen,
+    /// Makes pages of it.
+    pub make: MakePage<'a>,
 }
 
-impl Caster<'_> {
+impl<'a> Caster<'a> {
     /// What may lie within a rectangle of the picture: its upper left and its lower right pixel.
-    pub fn within(&self, low: DVec2, high: DVec2) -> Nearby {
-        self.reference.nearby(self.screen.eye, &pyramid(self.screen, low, high))
+    pub fn within(&self, low: DVec2, high: DVec2) -> Nearby<'a> {
+        Nearby::new(self.reference, self.screen, [low, high], self.make)
     }
 
     /// Where the ray of a pixel of that rectangle meets the ground.
-    pub fn meet(&self, nearby: &Nearby, pixel: DVec2) -> Option<Hit> {
-        let direction = self.screen.to_body(self.screen.tangents(pixel));
-        let hit = self.reference.meet(nearby, self.screen.eye, direction);
+    pub fn meet(&self, nearby: &mut Nearby<'a>, pixel: DVec2) -> Option<Hit> {
+        let hit = nearby.meet(self.screen.tangents(pixel));
         hit.filter(|hit| hit.depth_m >= self.screen.near_m)
     }
 
@@ -39,12 +41,12 @@ impl Caster<'_> {
         if low.min_element() < 0.0 || high.x > width || high.y > height {
             return None;
         }
-        let nearby = self.within(low, high);
+        let mut nearby = self.within(low, high);
         let aslant = core::f64::consts::FRAC_1_SQRT_2;
         let turns = [(1.0, 0.0), (aslant, aslant), (0.0, 1.0), (-aslant, aslant)];
         let all = turns.map(|(x, y)| DVec2::new(x, y) * radius_px);
-        let [a, b, c, d] = all.map(|step| self.meet(&nearby, pixel + step));
-        let [e, f, g, h] = all.map(|step| self.meet(&nearby, pixel - step));
+        let [a, b, c, d] = all.map(|step| self.meet(&mut nearby, pixel + step));
+        let [e, f, g, h] = all.map(|step| self.meet(&mut nearby, pixel - step));
         Some([a, b, c, d, e, f, g, h])
     }
 }

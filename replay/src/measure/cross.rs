@@ -7,7 +7,9 @@
 //!
 //! Pages are chosen anew, by spheres instead of boxes, as fine as the first way's or finer; then
 //! `Ground::ray` walks them cell by cell. Where both ways have the same pages the results agree
-//! to rounding; where this one has finer pages, by what the coarser ones leave out.
+//! to rounding; where this one has finer pages, by what the coarser ones leave out. Only what is
+//! farther than anything that the first way met in the part stays coarse: it is still met if what
+//! should hide it is not there.
 
 use super::cast::pyramid;
 use super::errors::Cross;
@@ -22,23 +24,18 @@ use overfly_core::ground::{Ground, LEVEL_MAX, Query};
 use overfly_core::lattice::normal_of;
 
 /// The part of the picture is this share of its width and height.
-const PART: f64 = 0.125;
+const PART: f64 = 1.0 / 24.0;
 /// No more pages than this: farther ones stay coarse.
 const PAGES_MAX: usize = 1500;
 
 /// Casts the rays of some part of the picture, another one in each frame.
 pub(super) fn measure(measure: &Measure, shot: &Shot<'_>) -> Cross {
     let (low, high) = part(measure, shot);
-    let ground = gather(measure, shot, &pyramid(&shot.screen, low, high));
+    let farthest_m = farthest_m(measure, shot, [low, high]);
+    let ground = gather(measure, shot, (&pyramid(&shot.screen, low, high), farthest_m));
     let (mut cross, mut found) = (Cross::default(), Vec::new());
-    for (row, column) in
-        (0..shot.grid.rows).flat_map(|r| (0..shot.grid.columns).map(move |c| (r, c)))
-    {
-        let pixel = shot.grid.pixel(column, row);
-        if pixel.cmplt(low).any() || pixel.cmpgt(high).any() {
-            continue;
-        }
-        let first = &measure.found[row as usize * shot.grid.columns as usize + column as usize];
+    for (at, pixel) in rays_within(shot, [low, high]) {
+        let first = &measure.found[at];
         let second = second_px(measure, shot, (&ground, pixel));
         cross.rays += 1;
         match second {
@@ -52,6 +49,28 @@ pub(super) fn measure(measure: &Measure, shot: &Shot<'_>) -> Cross {
     }
     cross.px = spread_of(&found);
     cross
+}
+
+/// The rays of a part of the picture, and their pixels.
+fn rays_within(
+    shot: &Shot<'_>,
+    [low, high]: [DVec2; 2],
+) -> impl Iterator<Item = (usize, DVec2)> + use<> {
+    let grid = shot.grid;
+    let all = (0..grid.rows).flat_map(move |row| (0..grid.columns).map(move |c| (c, row)));
+    let all = all.map(move |(column, row)| grid.pixel(column, row)).enumerate();
+    all.filter(move |(_, pixel)| pixel.cmpge(low).all() && pixel.cmple(high).all())
+}
+
+/// Distance of the farthest ground that the first way met in a part of the picture; infinite where
+/// a ray met none.
+fn farthest_m(measure: &Measure, shot: &Shot<'_>, part: [DVec2; 2]) -> f64 {
+    let away_m = |(at, pixel): (usize, DVec2)| {
+        let depth_m = measure.found[at].ground_m;
+        let seen = (depth_m > 0.0).then(|| depth_m * shot.screen.tangents(pixel).length());
+        seen.unwrap_or(f64::INFINITY)
+    };
+    rays_within(shot, part).map(away_m).fold(0.0, f64::max)
 }
 
 /// A part of the picture, in the half of it that shows more ground.
@@ -86,14 +105,14 @@ fn second_px(measure: &Measure, shot: &Shot<'_>, (ground, pixel): (&Ground, DVec
 }
 
 /// The pages of a part of the picture, and all above them.
-fn gather(measure: &Measure, shot: &Shot<'_>, planes: &[DVec3; 4]) -> Ground {
+fn gather(measure: &Measure, shot: &Shot<'_>, part: (&[DVec3; 4], f64)) -> Ground {
     let scene = shot.terrain.settings();
     let mut ground = Ground::new(scene.body, scene.sea);
     let mut wave: Vec<PageKey> = (0..4).map(PageKey::root).collect();
     while !wave.is_empty() && ground.pages() < PAGES_MAX {
         let mut next = Vec::new();
-        for page in wave.iter().filter_map(|&key| (shot.make)(key)) {
-            if is_coarse(measure, shot, &page, planes) {
+        for page in measure.pages(shot, &wave).into_iter().flatten() {
+            if is_coarse(measure, shot, &page, part) {
                 next.extend((0..4).map(|child| page.key.child(child)));
             }
             ground.insert(page);
@@ -104,7 +123,12 @@ fn gather(measure: &Measure, shot: &Shot<'_>, planes: &[DVec3; 4]) -> Ground {
 }
 
 /// Whether a page that this part may show has cells that look larger than a cell may.
-fn is_coarse(measure: &Measure, shot: &Shot<'_>, page: &Page, planes: &[DVec3; 4]) -> bool {
+fn is_coarse(
+    measure: &Measure,
+    shot: &Shot<'_>,
+    page: &Page,
+    (planes, farthest_m): (&[DVec3; 4], f64),
+) -> bool {
     if page.key.depth() >= LEVEL_MAX / 2 - PAGE_BITS {
         return false;
     }
@@ -126,6 +150,7 @@ fn is_coarse(measure: &Measure, shot: &Shot<'_>, page: &Page, planes: &[DVec3; 4
     let seen = planes.iter().all(|plane| plane.dot(away) >= -radius_m);
     let nearest_m = (away.length() - radius_m).max(shot.screen.near_m);
     let cell_px = cell_m * shot.screen.scale_px / nearest_m;
+    let seen = seen && nearest_m <= farthest_m;
     seen && cell_px > measure.settings.cell_px && !is_hidden(measure, shot, (centre, radius_m))
 }
 

@@ -15,18 +15,21 @@ use super::cast::Caster;
 use super::errors::{FlightErrors, FrameErrors};
 use super::holes::Seen;
 use super::mesh::{Foothold, MeshThen};
+use super::nearby::Nearby;
 use super::raster::Raster;
 use super::rays::Grid;
-use super::reference::{Hit, MakePage, Nearby, Reference};
+use super::reference::{Hit, MakePage, Reference};
 use super::screen::Screen;
+use super::share::share;
 use super::spread::{Gathered, Spread, Where};
 use super::thorough;
 use glam::{DVec2, DVec3};
 use overfly_core::camera::Camera;
+use overfly_core::datasource::{Page, PageKey};
 use overfly_core::frame::{FrameOutput, Terrain};
 use overfly_core::geodesy::{Ecef, Ellipsoid};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// How a flight is measured.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -87,6 +90,16 @@ impl Found {
     };
 }
 
+/// What the last ray found, near which the next one looks.
+#[derive(Default)]
+struct Last {
+    /// Leaf of the mesh.
+    leaf: usize,
+    /// Of this leaf it is known whether it stays as it was in the frame before.
+    asked: Option<usize>,
+    stays: bool,
+}
+
 /// Measures the frames of a flight.
 pub struct Measure {
     pub(super) settings: MeasureSettings,
@@ -106,6 +119,7 @@ pub struct Measure {
     pub(super) found: Vec<Found>,
     grid: Option<Grid>,
     measured: u64,
+    stop: Arc<AtomicBool>,
 }
 
 impl Measure {
@@ -115,7 +129,7 @@ impl Measure {
         Self {
             settings,
             body: scene.body,
-            reference: Reference::new(scene.body, scene.sea, settings.cell_px, settings.threads),
+            reference: Reference::new(scene.body, scene.sea, settings.cell_px),
             now: MeshThen::new(scene.body),
             before: MeshThen::new(scene.body),
             then: None,
@@ -124,7 +138,17 @@ impl Measure {
             found: Vec::new(),
             grid: None,
             measured: 0,
+            stop: Arc::default(),
         }
+    }
+
+    /// Gives up soon after this flag is set, even within a frame.
+    pub fn stop_on(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = stop;
+    }
+
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Takes the mesh of a frame over; the one taken before it becomes what pops are counted from.
@@ -143,16 +167,17 @@ impl Measure {
     }
 
     /// Measures the first view of the frame that a terrain has just run. The frame before must
-    /// have been taken or measured, else pops are not counted.
+    /// have been taken or measured, else pops are not counted. False if it was stopped: then there
+    /// is nothing of this frame.
     pub fn frame(
         &mut self,
         (terrain, output): (&Terrain, &FrameOutput),
         frame: u64,
         make: MakePage<'_>,
         flight: &mut FlightErrors,
-    ) {
+    ) -> bool {
         self.take(terrain, output);
-        self.judge((terrain, output), frame, make, flight);
+        self.judge((terrain, output), frame, make, flight)
     }
 
     /// Measures the frame whose mesh was taken last: [`Self::now`] is what is judged.
@@ -162,7 +187,7 @@ impl Measure {
         frame: u64,
         make: MakePage<'_>,
         flight: &mut FlightErrors,
-    ) {
+    ) -> bool {
         let camera = &output.views[0].camera;
         let screen = Screen::new(camera);
         let grid = Grid::new(screen.size_px, self.settings.rays, (self.settings.seed, frame));
@@ -182,20 +207,27 @@ impl Measure {
         if self.then.is_some() {
             errors.gap_ms = self.now.time_ms.wrapping_sub(self.before.time_ms);
         }
-        self.reference.gather(&screen, make);
-        self.raster.draw(&self.now.drawn, &screen, &grid);
-        self.trace(&screen, &grid);
+        self.reference.begin();
+        self.raster.draw(&self.now.drawn, (&screen, &grid), self.settings.threads);
+        self.trace((&screen, &grid), make);
+        if self.is_stopped() {
+            return false;
+        }
         errors.stretched = u64::from(self.raster.stretched);
         errors.triangles = u64::from(self.raster.triangles);
-        errors.missing_pages = self.reference.missing as u64;
         self.gather(&grid, &mut errors, flight);
-        self.count_holes((&screen, &grid), &mut errors);
+        self.count_holes((&screen, &grid), make, &mut errors);
         let due = |every: u64| every > 0 && self.measured.is_multiple_of(every);
         let due = [due(self.settings.thorough_every), due(self.settings.cross_every)];
         let shot = thorough::Shot { terrain, output, screen, grid, make, frame };
         errors.thorough = thorough::measure(self, &shot, due);
+        if self.is_stopped() {
+            return false;
+        }
+        errors.missing_pages = self.reference.missing();
         self.measured += 1;
         flight.frames.push(errors);
+        true
     }
 
     fn place_eye(&self, camera: &Camera, errors: &mut FrameErrors) {
@@ -205,67 +237,81 @@ impl Measure {
         errors.above_m = foothold.map_or(f64::NAN, |found| at.height_m - found.height_m);
     }
 
+    /// A page: the reference's own, if it has it.
+    pub(super) fn page(&self, shot: &thorough::Shot<'_>, key: PageKey) -> Option<Arc<Page>> {
+        self.reference.page(key).or_else(|| (shot.make)(key))
+    }
+
+    /// Pages, made on all threads where they must be; none after it was stopped.
+    pub(super) fn pages(
+        &self,
+        shot: &thorough::Shot<'_>,
+        keys: &[PageKey],
+    ) -> Vec<Option<Arc<Page>>> {
+        let make = |at: usize| if self.is_stopped() { None } else { self.page(shot, keys[at]) };
+        share(keys.len(), self.settings.threads, make)
+    }
+
     /// Whether there is a frame before, from which pops are counted.
     pub(super) fn has_before(&self) -> bool {
         self.then.is_some()
     }
 
     /// All rays, tile by tile on all threads; each result has its own place.
-    fn trace(&mut self, screen: &Screen, grid: &Grid) {
+    fn trace(&mut self, (screen, grid): (&Screen, &Grid), make: MakePage<'_>) {
         let mut found = std::mem::take(&mut self.found);
         found.clear();
         found.resize(grid.len(), Found::NOTHING);
         let columns = grid.columns as usize;
-        let bands: Vec<Mutex<(usize, &mut [Found])>> =
-            found.chunks_mut(columns * TILE).enumerate().map(Mutex::new).collect();
-        let next = AtomicUsize::new(0);
-        let work = || {
-            while let Some(band) = bands.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let mut band = band.lock().unwrap_or_else(PoisonError::into_inner);
-                let (at, rays) = &mut *band;
-                self.trace_band((screen, grid), *at * TILE, rays);
-            }
-        };
-        std::thread::scope(|scope| {
-            (1..self.settings.threads.max(1)).for_each(|_| drop(scope.spawn(work)));
-            work();
+        let caster = Caster { reference: &self.reference, screen, make };
+        let bands: Vec<Mutex<&mut [Found]>> =
+            found.chunks_mut(columns * TILE).map(Mutex::new).collect();
+        share(bands.len(), self.settings.threads, |at| {
+            let mut rays = bands[at].lock().unwrap_or_else(PoisonError::into_inner);
+            self.trace_band(&caster, grid, at * TILE, &mut rays);
         });
         self.found = found;
     }
 
-    fn trace_band(&self, (screen, grid): (&Screen, &Grid), first: usize, rays: &mut [Found]) {
+    fn trace_band(&self, caster: &Caster<'_>, grid: &Grid, first: usize, rays: &mut [Found]) {
         let columns = grid.columns as usize;
         let rows = rays.len() / columns;
         let stratum = grid.stratum_px();
-        let caster = Caster { reference: &self.reference, screen };
         for left in (0..columns).step_by(TILE) {
             let right = (left + TILE).min(columns);
             let corner = |column: usize, row: usize| {
                 DVec2::new(column as f64, (first + row) as f64) * stratum
             };
-            let nearby = caster.within(corner(left, 0), corner(right, rows));
-            let mut level = 30;
+            if self.is_stopped() {
+                return;
+            }
+            let mut nearby = caster.within(corner(left, 0), corner(right, rows));
+            let mut last = Last::default();
             for (row, column) in (0..rows).flat_map(|row| (left..right).map(move |c| (row, c))) {
                 let at = (column, first + row);
                 rays[row * columns + column] =
-                    self.trace_ray(&caster, (&nearby, grid), at, &mut level);
+                    self.trace_ray(caster, (&mut nearby, grid), at, &mut last);
             }
         }
     }
 
     /// The ray of stratum (column, row).
-    fn trace_ray(
+    fn trace_ray<'a>(
         &self,
-        caster: &Caster<'_>,
-        (nearby, grid): (&Nearby, &Grid),
+        caster: &Caster<'a>,
+        (nearby, grid): (&mut Nearby<'a>, &Grid),
         (column, row): (usize, usize),
-        level: &mut u8,
+        last: &mut Last,
     ) -> Found {
         let [c, r] = [column, row].map(|at| u32::try_from(at).expect("a stratum"));
         let pixel = grid.pixel(c, r);
         let Some(hit) = caster.meet(nearby, pixel) else { return Found::NOTHING };
-        let mesh_m = self.raster.depth_m[row * grid.columns as usize + column];
-        let found = self.compare(caster.screen, &hit, level);
+        let ray = row * grid.columns as usize + column;
+        let mesh_m = self.raster.depth_m[ray];
+        if mesh_m.is_finite() {
+            last.leaf = self.raster.leaf[ray] as usize;
+        }
+        let found = self.compare(caster.screen, &hit, last);
         if !mesh_m.is_finite() {
             return found;
         }
@@ -274,19 +320,19 @@ impl Measure {
         Found { e2_share: along_m / hit.depth_m, e2_m: along_m * length, ..found }
     }
 
-    fn compare(&self, screen: &Screen, hit: &Hit, level: &mut u8) -> Found {
+    fn compare(&self, screen: &Screen, hit: &Hit, last: &mut Last) -> Found {
         let mut found = Found { ground_m: hit.depth_m, normal: hit.normal, ..Found::NOTHING };
-        let Some(now) = self.now.find(hit.normal, *level) else {
+        let Some(now) = self.now.find_near(hit.normal, last.leaf) else {
             return Found { lost: true, ..found };
         };
-        *level = self.now.leaf(&now).level;
+        last.leaf = now.leaf;
         let mesh = hit.place + hit.normal * (now.height_m - hit.height_m);
         let (Some(a), Some(b)) = (screen.pixel(mesh), screen.pixel(hit.place)) else {
             return found;
         };
         found.e1_px = (a - b).length();
         if self.then.is_some_and(|then| then.shows(hit.place)) {
-            let pop = self.pop(screen, hit, (&now, a));
+            let pop = self.pop(screen, hit, (&now, a), last);
             (found.p1_px, found.p3_deg) = pop.unwrap_or((0.0, 0.0));
         }
         found
@@ -299,13 +345,18 @@ impl Measure {
         screen: &Screen,
         hit: &Hit,
         (now, pixel): (&Foothold, DVec2),
+        last: &mut Last,
     ) -> Option<(f64, f64)> {
         let leaf = self.now.leaf(now);
-        let same = |at: usize| {
-            let was = &self.before.drawn.leaves[at];
-            was.content == leaf.content && !was.morphs && !leaf.morphs
-        };
-        if self.before.drawn.find(leaf.key).is_some_and(same) {
+        if last.asked != Some(now.leaf) {
+            let same = |at: usize| {
+                let was = &self.before.drawn.leaves[at];
+                was.content == leaf.content && !was.morphs && !leaf.morphs
+            };
+            last.asked = Some(now.leaf);
+            last.stays = self.before.drawn.find(leaf.key).is_some_and(same);
+        }
+        if last.stays {
             return None;
         }
         let then = self.before.find(hit.normal, leaf.level)?;
@@ -314,22 +365,29 @@ impl Measure {
         Some(((screen.pixel(mesh)? - pixel).length(), turned_rad.to_degrees()))
     }
 
-    fn gather(&mut self, grid: &Grid, errors: &mut FrameErrors, flight: &mut FlightErrors) {
-        let of = |value: fn(&Found) -> f64, gathered: &mut Gathered| {
+    fn gather(&self, grid: &Grid, errors: &mut FrameErrors, flight: &mut FlightErrors) {
+        let frame = errors.frame;
+        let of = |value: fn(&Found) -> f64, spread: &mut Spread, gathered: &mut Gathered| {
             let met = |&at: &usize| value(&self.found[at]) >= 0.0;
             let met: Vec<usize> = (0..self.found.len()).filter(met).collect();
             let mut values: Vec<f64> = met.iter().map(|&at| value(&self.found[at])).collect();
-            let spread = Spread::of(&mut values, |at| self.place(grid, met[at], errors.frame));
-            gathered.add(&values, &spread);
-            spread
+            *spread = Spread::of(&mut values, |at| self.place(grid, met[at], frame));
+            gathered.add(&values, spread);
         };
-        let e1_px = of(|found| found.e1_px, &mut flight.e1_px);
-        let e2_share = of(|found| found.e2_share, &mut flight.e2_share);
-        let e2_m = of(|found| found.e2_m, &mut flight.e2_m);
-        let p1_px = of(|found| found.p1_px, &mut flight.p1_px);
-        let p3_deg = of(|found| found.p3_deg, &mut flight.p3_deg);
-        (errors.e1_px, errors.e2_share, errors.e2_m) = (e1_px, e2_share, e2_m);
-        (errors.p1_px, errors.p3_deg) = (p1_px, p3_deg);
+        type Value = fn(&Found) -> f64;
+        let all: [(Value, &mut Spread, &mut Gathered); 5] = [
+            (|found| found.e1_px, &mut errors.e1_px, &mut flight.e1_px),
+            (|found| found.e2_share, &mut errors.e2_share, &mut flight.e2_share),
+            (|found| found.e2_m, &mut errors.e2_m, &mut flight.e2_m),
+            (|found| found.p1_px, &mut errors.p1_px, &mut flight.p1_px),
+            (|found| found.p3_deg, &mut errors.p3_deg, &mut flight.p3_deg),
+        ];
+        let all = all.map(Mutex::new);
+        share(all.len(), self.settings.threads, |at| {
+            let mut one = all[at].lock().unwrap_or_else(PoisonError::into_inner);
+            let (value, spread, gathered) = &mut *one;
+            of(*value, spread, gathered);
+        });
         let count = |is: fn(&Found) -> bool| self.found.iter().filter(|f| is(f)).count() as u64;
         errors.lost = count(|found| found.lost);
         errors.p1_above_half = count(|found| found.p1_px > 0.5);
@@ -354,20 +412,25 @@ impl Measure {
         }
     }
 
-    fn count_holes(&self, (screen, grid): (&Screen, &Grid), errors: &mut FrameErrors) {
+    fn count_holes(
+        &self,
+        (screen, grid): (&Screen, &Grid),
+        make: MakePage<'_>,
+        errors: &mut FrameErrors,
+    ) {
         let ground = |at: usize| self.found[at].ground_m > 0.0;
         let mesh = |at: usize| self.raster.depth_m[at].is_finite();
         let differ = (0..grid.len()).filter(|&at| ground(at) != mesh(at));
         errors.e3_rays = differ.count() as u64;
         let seen = Seen {
-            caster: Caster { reference: &self.reference, screen },
+            caster: Caster { reference: &self.reference, screen, make },
             grid,
             ground_m: &|at| self.found[at].ground_m,
             raster: &self.raster,
             mesh: &self.now.drawn,
             stray_px: errors.bound_px.min(4.0 * errors.e1_px.p99 + 1.0),
         };
-        [errors.holes, errors.pinholes] = seen.count();
+        [errors.holes, errors.pinholes] = seen.count(self.settings.threads);
     }
 
     /// E1 of every ray of the frame that was measured last, row by row, and how many are in a row;

@@ -15,7 +15,7 @@ use super::spread::{Spread, Where};
 use super::thorough::{Shot, spread_of};
 use super::wide::{Wide, Wide3};
 use glam::{DVec2, DVec3, IVec3};
-use overfly_core::datasource::Page;
+use overfly_core::datasource::{Page, PageKey};
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
 use overfly_core::ground::{Ground, LEVEL_MAX, Place, Query};
 use overfly_core::lattice::{RADIUS, fold};
@@ -44,7 +44,7 @@ pub(super) fn queries(measure: &Measure, shot: &Shot<'_>) -> Spread {
         let Some(leaf) = measure.now.find(normal, 30) else { continue };
         let drawn = measure.now.leaf(&leaf).level + depth;
         let level = (drawn + u8::from(index % 2 == 1)).clamp(LEVEL_LEAST, LEVEL_MAX);
-        if let Some(error_m) = query_error_m(shot, normal, level) {
+        if let Some(error_m) = query_error_m(measure, shot, (normal, level)) {
             found.push((error_m, place(measure, shot, normal)));
         }
     }
@@ -55,9 +55,9 @@ pub(super) fn queries(measure: &Measure, shot: &Shot<'_>) -> Spread {
 const LEVEL_LEAST: u8 = 12;
 
 /// How far a query's answer is from the height computed anew.
-fn query_error_m(shot: &Shot<'_>, normal: DVec3, level: u8) -> Option<f64> {
+fn query_error_m(measure: &Measure, shot: &Shot<'_>, (normal, level): (DVec3, u8)) -> Option<f64> {
     let scene = shot.terrain.settings();
-    let page = (shot.make)(Place::of(normal).triangle(level).0.page())?;
+    let page = measure.page(shot, Place::of(normal).triangle(level).0.page())?;
     answer_error_m((&scene.body, scene.sea), [&page, &page], normal, level)
 }
 
@@ -181,9 +181,11 @@ pub(super) fn mesh(measure: &Measure, shot: &Shot<'_>) -> [Spread; 4] {
     let [gear, near, far] = [GEAR_M.to_vec(), ring(&RINGS_M[0]), ring(&RINGS_M[1])]
         .map(|offsets| beside(&measure.body, up, &offsets));
     let below = |normals: &[DVec3]| {
-        let found = normals.iter().filter_map(|&normal| {
+        let keys: Vec<PageKey> = normals.iter().map(|&normal| truth.page(normal)).collect();
+        let pages = measure.pages(shot, &keys);
+        let found = normals.iter().zip(pages).filter_map(|(&normal, page)| {
             let drawn = measure.now.find(normal, 40)?;
-            let error_m = truth.height_m(shot, normal)? - drawn.height_m;
+            let error_m = truth.height_m(shot, normal, page?)? - drawn.height_m;
             Some((error_m.abs(), place(measure, shot, normal)))
         });
         spread_of(&found.collect::<Vec<_>>())
@@ -227,9 +229,12 @@ impl Truth {
         Self { level: (lod.level_max + lod.patch_depth).clamp(LEVEL_LEAST, LEVEL_MAX) }
     }
 
-    fn height_m(&self, shot: &Shot<'_>, normal: DVec3) -> Option<f64> {
+    fn page(&self, normal: DVec3) -> PageKey {
+        Place::of(normal).triangle(self.level).0.page()
+    }
+
+    fn height_m(&self, shot: &Shot<'_>, normal: DVec3, page: Arc<Page>) -> Option<f64> {
         let scene = shot.terrain.settings();
-        let page = (shot.make)(Place::of(normal).triangle(self.level).0.page())?;
         let mut ground = Ground::new(scene.body, scene.sea);
         ground.insert(page);
         let answer = ground.height(at_normal(normal), Query::Exact(self.level));

@@ -14,6 +14,7 @@ use super::cast::Caster;
 use super::raster::Raster;
 use super::rays::Grid;
 use super::reference::Hit;
+use super::share::share;
 use glam::{DVec2, DVec3};
 use overfly_core::inspect::DrawnMesh;
 use overfly_core::lattice::normal_of;
@@ -31,7 +32,7 @@ pub struct Seen<'a> {
     /// The rays.
     pub grid: &'a Grid,
     /// Depth of the ground by ray; 0 where there is none.
-    pub ground_m: &'a dyn Fn(usize) -> f64,
+    pub ground_m: &'a (dyn Fn(usize) -> f64 + Sync),
     /// The mesh by ray.
     pub raster: &'a Raster,
     /// The whole of it.
@@ -41,12 +42,17 @@ pub struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// How many rays are C4, and how many C5.
-    pub fn count(&self) -> [u64; 2] {
+    /// How many rays are C4, and how many C5; counted on so many threads.
+    pub fn count(&self, threads: usize) -> [u64; 2] {
+        let rows = share(self.grid.rows as usize, threads, |row| {
+            self.count_row(u32::try_from(row).expect("a row of strata"))
+        });
+        rows.into_iter().fold([0; 2], |all, row| [all[0] + row[0], all[1] + row[1]])
+    }
+
+    fn count_row(&self, row: u32) -> [u64; 2] {
         let mut counts = [0; 2];
-        for (row, column) in
-            (0..self.grid.rows).flat_map(|r| (0..self.grid.columns).map(move |c| (r, c)))
-        {
+        for column in 0..self.grid.columns {
             let at = self.at(column, row);
             let ground_m = (self.ground_m)(at);
             if ground_m <= 0.0 || !self.is_beyond(at) {

@@ -74,7 +74,24 @@ impl MeshThen {
     /// The leaf around a normal, and where its vertical meets that; levels near `hint` are tried
     /// first. `None` only where the mesh has a hole.
     pub fn find(&self, normal: DVec3, hint: u8) -> Option<Foothold> {
+        self.find_at(&Place::of(normal), normal, hint)
+    }
+
+    /// The same, where a leaf is known that may be the one around the normal.
+    pub fn find_near(&self, normal: DVec3, guess: usize) -> Option<Foothold> {
         let place = Place::of(normal);
+        let Some(leaf) = self.drawn.leaves.get(guess) else {
+            return self.find_at(&place, normal, 30);
+        };
+        let (cell, corners, weights) = place.triangle(leaf.level);
+        if triangle_id(corners.map(|corner| cell.point(corner))) != leaf.key {
+            return self.find_at(&place, normal, leaf.level);
+        }
+        let turned = cell.point(corners[1]) != leaf.corners[1];
+        Some(self.foothold(guess, (weights, turned), normal))
+    }
+
+    fn find_at(&self, place: &Place, normal: DVec3, hint: u8) -> Option<Foothold> {
         for step in 0..=u8::MAX {
             let level = match step % 2 {
                 0 => hint.checked_add(step / 2),
@@ -92,10 +109,8 @@ impl MeshThen {
             else {
                 continue;
             };
-            let [apex, second, third] = weights;
             let turned = cell.point(corners[1]) != self.drawn.leaves[leaf].corners[1];
-            let weights = if turned { [apex, third, second] } else { weights };
-            return Some(self.foothold(leaf, weights, normal));
+            return Some(self.foothold(leaf, (weights, turned), normal));
         }
         None
     }
@@ -105,8 +120,16 @@ impl MeshThen {
         &self.drawn.leaves[foothold.leaf]
     }
 
-    /// Where a vertical meets the small triangle at these weights of apex and hypotenuse.
-    fn foothold(&self, leaf: usize, weights: [f64; 3], normal: DVec3) -> Foothold {
+    /// Where a vertical meets the small triangle at these weights of apex and hypotenuse, whose ends
+    /// may be named the other way round.
+    fn foothold(
+        &self,
+        leaf: usize,
+        (weights, turned): ([f64; 3], bool),
+        normal: DVec3,
+    ) -> Foothold {
+        let [apex, second, third] = weights;
+        let weights = if turned { [apex, third, second] } else { weights };
         let first = leaf * self.drawn.vertices_per_patch();
         let (corners, weights) = small_triangle(self.drawn.patch_depth, weights);
         let corners = corners.map(|at| first + at);

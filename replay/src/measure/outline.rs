@@ -31,7 +31,7 @@ pub(super) fn measure(measure: &Measure, shot: &Shot<'_>) -> (Spread, u64) {
     let up = shot.output.views[0].camera.normal;
     let screen = upright(&shot.screen, up);
     let tops = mesh_tops(&measure.now.drawn, &screen);
-    let caster = Caster { reference: &measure.reference, screen: &screen };
+    let caster = Caster { reference: &measure.reference, screen: &screen, make: shot.make };
     let (mut found, mut lost) = (Vec::new(), 0);
     for (column, top) in (0_u32..).zip(tops) {
         let x = column_px(&screen, column);
@@ -77,8 +77,8 @@ enum Top {
 
 fn ground_top(caster: &Caster<'_>, x: f64) -> Top {
     let height = caster.screen.size_px[1];
-    let nearby = caster.within(DVec2::new(x - 0.5, 0.0), DVec2::new(x + 0.5, height));
-    let meet = |y: f64| caster.meet(&nearby, DVec2::new(x, y));
+    let mut nearby = caster.within(DVec2::new(x - 0.5, 0.0), DVec2::new(x + 0.5, height));
+    let mut meet = |y: f64| caster.meet(&mut nearby, DVec2::new(x, y));
     if meet(0.0).is_some() {
         return Top::Outside;
     }

@@ -2,39 +2,36 @@
 //!
 //! In:    a page; a ray in the plate's axes.
 //! Out:   where the ray first meets the plate's triangles.
-//! Keeps: a local frame, 65 × 65 places, a pyramid of boxes: some 240 KiB.
-//! Not here: which plates a frame needs (`reference`).
+//! Keeps: its page, a local frame, 65 × 65 places, a pyramid of boxes: some 170 KiB.
+//! Not here: which plates a frame needs (`reference`), how a ray meets boxes (`boxes`).
+//! Source: Woop, Benthin, Wald, "Watertight ray/triangle intersection", 2013.
 //!
 //! Triangles are those of the page's even lattice level, as the drawn mesh would have them. A box
 //! holds all corners of its triangles, and so the triangles: no peak is ever skipped. A skirt hangs
 //! from the border, so that no ray slips between two plates of different depth.
 
+use super::boxes::{Box3, Origin, Quad, Ray, Steps};
 use glam::{DMat3, DVec3};
 use overfly_core::datasource::key::{PAGE_BITS, PAGE_SIDE};
-use overfly_core::datasource::page::SAMPLES;
+use overfly_core::datasource::page::{BOUND_SIDE, SAMPLES};
 use overfly_core::datasource::{Page, PageKey};
 use overfly_core::geodesy::Ellipsoid;
-use overfly_core::ground::Cell;
 use overfly_core::lattice::normal_of;
+use std::sync::Arc;
 
 /// Squares of two by two cells are the smallest that have a box.
 const LEAF_BITS: u8 = PAGE_BITS - 1;
-/// Boxes of a plate: 1 + 4 + … + 4⁵.
+/// Squares of all sizes: 1 + 4 + … + 4⁵.
 const BOXES: usize = ((1 << (2 * (LEAF_BITS as usize + 1))) - 1) / 3;
-
-/// Least and greatest corner.
-#[derive(Clone, Copy, Debug)]
-pub struct Box3 {
-    /// Least coordinates.
-    pub low: DVec3,
-    /// Greatest coordinates.
-    pub high: DVec3,
-}
+/// Those that are cut in four: 1 + 4 + … + 4⁴.
+const QUADS: usize = ((1 << (2 * LEAF_BITS as usize)) - 1) / 3;
 
 /// One page of the reference ground.
 pub struct Plate {
     /// Its page.
     pub key: PageKey,
+    /// The page itself.
+    pub page: Arc<Page>,
     /// Middle of the page, body-fixed.
     pub origin: DVec3,
     /// From body-fixed axes to the plate's: the third is the vertical of its middle.
@@ -47,10 +44,32 @@ pub struct Plate {
     pub high_m: f64,
     /// Least height of the samples, metres.
     pub low_m: f64,
-    surface_m: Vec<f64>,
+    whole: Box3,
+    steps: Steps,
+    quarters: [Box3; 4],
+    sea: bool,
     places: Vec<DVec3>,
-    boxes: Vec<Box3>,
+    quads: Vec<Quad>,
     skirt_m: f64,
+}
+
+/// A square of a plate: one of 2^bits by 2^bits, counted quarter by quarter.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Part {
+    /// How often the plate was cut in four.
+    pub bits: u8,
+    /// Which of the parts.
+    pub at: u16,
+}
+
+impl Part {
+    /// All of the plate.
+    pub const WHOLE: Self = Self { bits: 0, at: 0 };
+
+    /// Its quarters.
+    pub fn quarters(self) -> [Self; 4] {
+        [0, 1, 2, 3].map(|kid| Self { bits: self.bits + 1, at: 4 * self.at + kid })
+    }
 }
 
 /// Where a ray met a plate: a triangle of a cell, or the skirt below one of its edges.
@@ -64,37 +83,9 @@ pub struct Meeting {
     pub weights: [f64; 3],
 }
 
-impl Box3 {
-    const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
-
-    fn with(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
-    }
-
-    /// Grown on all sides.
-    pub fn grown(self, by: f64) -> Self {
-        Self { low: self.low - by, high: self.high + by }
-    }
-
-    /// Where a ray enters, if it does before `end`. Division by zero gives infinities, as it must.
-    #[inline]
-    fn entry(&self, from: DVec3, per: DVec3, end: f64) -> Option<f64> {
-        let (a, b) = ((self.low - from) * per, (self.high - from) * per);
-        let (near, far) = (a.min(b), a.max(b));
-        let enter = near.max_element().max(0.0);
-        let leave = far.min_element().min(end);
-        (enter <= leave).then_some(enter)
-    }
-
-    /// Distance from a point; 0 inside.
-    pub fn distance(&self, point: DVec3) -> f64 {
-        (self.low - point).max(point - self.high).max(DVec3::ZERO).length()
-    }
-}
-
 impl Plate {
-    /// Looks through a page once: some 300 µs.
-    pub fn new(page: &Page, body: &Ellipsoid, sea: bool) -> Self {
+    /// Looks through a page once: some 400 µs.
+    pub fn new(page: Arc<Page>, body: &Ellipsoid, sea: bool) -> Self {
         let key = page.key;
         let middle = PAGE_SIDE / 2;
         let up = normal_of(key.sample(middle, middle));
@@ -102,36 +93,35 @@ impl Plate {
         let aside = if up.z.abs() < 0.9 { DVec3::Z } else { DVec3::X };
         let east = aside.cross(up).normalize();
         let axes = DMat3::from_cols(east, up.cross(east), up).transpose();
+        let (mut low_m, mut high_m) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut places = Vec::with_capacity(SAMPLES);
+        for (j, i) in (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (j, i))) {
+            let normal = normal_of(key.sample(i, j));
+            let surface_m = page.surface_m(j * PAGE_SIDE + i, sea);
+            (low_m, high_m) = (low_m.min(surface_m), high_m.max(surface_m));
+            let place = body.surface_from_normal(normal) + normal * surface_m;
+            places.push(axes * (place - origin));
+        }
+        let last = PAGE_SIDE - 1;
+        let across = |at: usize| (places[at] - places[0]).length();
+        let cell_m = across(last).max(across(last * PAGE_SIDE)) / last as f64;
         let mut plate = Self {
             key,
             origin,
             axes,
             error_max_m: 0.0,
-            cell_m: 0.0,
-            high_m: f64::NEG_INFINITY,
-            low_m: f64::INFINITY,
-            surface_m: Vec::with_capacity(SAMPLES),
-            places: Vec::with_capacity(SAMPLES),
-            boxes: vec![Box3::EMPTY; BOXES],
-            skirt_m: 0.0,
+            cell_m,
+            high_m,
+            low_m,
+            whole: Box3::EMPTY,
+            steps: Steps::new(&Box3::EMPTY),
+            quarters: [Box3::EMPTY; 4],
+            sea,
+            places,
+            quads: Vec::with_capacity(QUADS),
+            skirt_m: 0.5 * cell_m,
+            page,
         };
-        for (j, i) in (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (j, i))) {
-            let normal = normal_of(key.sample(i, j));
-            let surface_m = page.surface_m(j * PAGE_SIDE + i, sea);
-            plate.low_m = plate.low_m.min(surface_m);
-            plate.high_m = plate.high_m.max(surface_m);
-            let place = body.surface_from_normal(normal) + normal * surface_m;
-            plate.surface_m.push(surface_m);
-            plate.places.push(axes * (place - origin));
-        }
-        for bound in &page.bounds {
-            let error_m = bound.error_odd_m.max(bound.error_even_m);
-            plate.error_max_m = plate.error_max_m.max(f64::from(error_m));
-        }
-        let last = PAGE_SIDE - 1;
-        let across = |(i, j): (usize, usize)| (plate.at(i, j) - plate.at(0, 0)).length();
-        plate.cell_m = across((last, 0)).max(across((0, last))) / last as f64;
-        plate.skirt_m = 0.5 * plate.cell_m;
         plate.fill_boxes();
         plate
     }
@@ -143,35 +133,73 @@ impl Plate {
 
     fn fill_boxes(&mut self) {
         let side = 1_usize << LEAF_BITS;
+        let mut boxes = vec![Box3::EMPTY; BOXES];
         for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
             let mut found = Box3::EMPTY;
             for (j, i) in (0..3).flat_map(|j| (0..3).map(move |i| (2 * y + j, 2 * x + i))) {
                 let at = self.at(i, j);
                 found = found.with(Box3 { low: at, high: at });
             }
-            if x == 0 || y == 0 || x + 1 == side || y + 1 == side {
+            if is_border(x, y) {
                 found.low.z -= self.skirt_m;
             }
-            self.boxes[place(LEAF_BITS, x, y)] = found;
+            boxes[place(LEAF_BITS, x, y)] = found;
         }
         for bits in (0..LEAF_BITS).rev() {
             for (y, x) in (0..1 << bits).flat_map(|y| (0..1 << bits).map(move |x| (y, x))) {
-                let kid =
-                    |dx: usize, dy: usize| self.boxes[place(bits + 1, 2 * x + dx, 2 * y + dy)];
-                let all = kid(0, 0).with(kid(1, 0)).with(kid(0, 1)).with(kid(1, 1));
-                self.boxes[place(bits, x, y)] = all;
+                let kids = KIDS.map(|(dx, dy)| boxes[place(bits + 1, 2 * x + dx, 2 * y + dy)]);
+                boxes[place(bits, x, y)] = kids.into_iter().fold(Box3::EMPTY, Box3::with);
             }
         }
+        self.whole = boxes[0];
+        self.steps = Steps::new(&self.whole);
+        for bits in 0..LEAF_BITS {
+            for at in 0..1 << (2 * bits) {
+                let (x, y) = square(at);
+                let kids = KIDS.map(|(dx, dy)| boxes[place(bits + 1, 2 * x + dx, 2 * y + dy)]);
+                self.quads.push(Quad::new(&kids, &self.steps));
+            }
+        }
+        for (index, (x, y)) in KIDS.into_iter().enumerate() {
+            let error_m = self.error_m(index);
+            self.error_max_m = self.error_max_m.max(error_m);
+            self.quarters[index] = boxes[place(1, x, y)].grown(error_m);
+        }
+    }
+
+    /// How far the ground of a quarter strays from the triangles at most, as the page has it.
+    fn error_m(&self, quarter: usize) -> f64 {
+        let half = BOUND_SIDE / 2;
+        let (i0, j0) = (quarter % 2 * half, quarter / 2 * half);
+        let all = (j0..=j0 + half).flat_map(|j| (i0..=i0 + half).map(move |i| (i, j)));
+        let bounds = all.map(|(i, j)| &self.page.bounds[j * BOUND_SIDE + i]);
+        bounds.map(|bound| f64::from(bound.error_odd_m.max(bound.error_even_m))).fold(0.0, f64::max)
     }
 
     /// The box around everything, in the plate's axes.
     pub fn whole(&self) -> Box3 {
-        self.boxes[0]
+        self.whole
     }
 
-    /// The box around a quarter, in the plate's axes; counted as pages count their children.
+    /// The box around all that finer plates of a quarter may have, in the plate's axes; counted as
+    /// pages count their children.
     pub fn quarter(&self, index: usize) -> Box3 {
-        self.boxes[place(1, index % 2, index / 2)]
+        self.quarters[index]
+    }
+
+    /// A part of it.
+    pub fn part(&self, part: Part) -> Box3 {
+        let Part { bits, at } = part;
+        if bits == 0 {
+            return self.whole;
+        }
+        let quad = &self.quads[first_of(bits - 1) + usize::from(at / 4)];
+        quad.get(usize::from(at % 4), &self.steps)
+    }
+
+    /// Where rays come from, for [`Self::meet`]: a point in the plate's axes.
+    pub fn origin(&self, from: DVec3) -> Origin {
+        Origin::new(from, &self.steps)
     }
 
     /// A point in the plate's axes.
@@ -186,38 +214,43 @@ impl Plate {
 
     /// Height of the surface at a sample, metres.
     pub fn surface_m(&self, (i, j): (usize, usize)) -> f64 {
-        self.surface_m[j * PAGE_SIDE + i]
+        self.page.surface_m(j * PAGE_SIDE + i, self.sea)
     }
 
-    /// Where a ray in the plate's axes first meets the plate before `end`.
-    pub fn meet(&self, from: DVec3, direction: DVec3, end: f64) -> Option<Meeting> {
-        let per = direction.recip();
+    /// Where a ray in the plate's axes first meets a part of the plate before `end`. `origin` is where it
+    /// comes from, as [`Self::origin`] has it.
+    pub fn meet(
+        &self,
+        part: Part,
+        origin: &Origin,
+        (from, direction): (DVec3, DVec3),
+        end: f64,
+    ) -> Option<Meeting> {
+        let ray = Ray::new(origin, direction);
+        let shear = Shear::new(from, direction);
         let mut best: Option<Meeting> = None;
         let mut until = end;
-        let mut stack = [(0.0, 0_u8, 0_usize, 0_usize); 4 * LEAF_BITS as usize];
-        let mut count = 0;
-        if let Some(t) = self.boxes[0].entry(from, per, until) {
-            stack[0] = (t, 0, 0, 0);
-            count = 1;
-        }
+        let mut stack = [(0.0, 0_u8, 0_u16); 4 * LEAF_BITS as usize];
+        stack[0] = (0.0, part.bits, part.at);
+        let mut count = 1;
         while count > 0 {
             count -= 1;
-            let (t, bits, x, y) = stack[count];
-            if t > until {
+            let (t, bits, at) = stack[count];
+            if f64::from(t) > until {
                 continue;
             }
             if bits == LEAF_BITS {
-                best = self.meet_square((from, direction), (x, y), until).or(best);
+                best =
+                    self.meet_square((from, direction, &shear), square(at.into()), until).or(best);
                 until = best.map_or(until, |found| found.t);
                 continue;
             }
+            let (entries, met) = ray.enters(&self.quads[first_of(bits) + usize::from(at)], until);
             let first = count;
-            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let (x, y) = (2 * x + dx, 2 * y + dy);
-                let entry = self.boxes[place(bits + 1, x, y)].entry(from, per, until);
+            for (kid, t) in (0..4).zip(entries) {
                 // The nearest lies on top.
-                stack[count] = (entry.unwrap_or(f64::INFINITY), bits + 1, x, y);
-                count += usize::from(entry.is_some());
+                stack[count] = (t, bits + 1, 4 * at + kid);
+                count += (met >> kid & 1) as usize;
                 sink(&mut stack[first..count]);
             }
         }
@@ -225,54 +258,26 @@ impl Plate {
     }
 
     /// The triangles of two by two cells, and their skirts.
+    #[inline]
     fn meet_square(
         &self,
-        (from, direction): (DVec3, DVec3),
+        (from, direction, shear): (DVec3, DVec3, &Shear),
         (x, y): (usize, usize),
         end: f64,
     ) -> Option<Meeting> {
-        let mut best: Option<Meeting> = None;
-        let mut until = end;
-        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let (i, j) = (2 * x + dx, 2 * y + dy);
-            for corners in self.triangles(i, j) {
-                best = self.meet_corners((from, direction), corners, until).or(best);
-                until = best.map_or(until, |found| found.t);
-            }
-            for edge in self.border(i, j).into_iter().flatten() {
+        let mut best = shear.meet(|(i, j)| self.at(2 * x + i, 2 * y + j), end).map(|found| {
+            let corners = found.corners.map(|(i, j)| (2 * x + i, 2 * y + j));
+            Meeting { corners, ..found }
+        });
+        let mut until = best.map_or(end, |found| found.t);
+        if is_border(x, y) {
+            let cells = KIDS.map(|(dx, dy)| (2 * x + dx, 2 * y + dy));
+            for edge in cells.into_iter().flat_map(|(i, j)| self.border(i, j)).flatten() {
                 best = self.meet_skirt((from, direction), edge, until).or(best);
                 until = best.map_or(until, |found| found.t);
             }
         }
         best
-    }
-
-    fn meet_corners(
-        &self,
-        (from, direction): (DVec3, DVec3),
-        corners: [(usize, usize); 3],
-        end: f64,
-    ) -> Option<Meeting> {
-        let places = corners.map(|(i, j)| self.at(i, j));
-        let (t, weights) = meet_triangle(from, direction, places, end)?;
-        Some(Meeting { t, corners, weights })
-    }
-
-    /// Both triangles of a cell.
-    fn triangles(&self, i: usize, j: usize) -> [[(usize, usize); 3]; 2] {
-        let index =
-            |of: u32, at: usize| (of << PAGE_BITS) + u32::try_from(at).expect("a cell of a page");
-        let level = 2 * (self.key.depth() + PAGE_BITS);
-        let cell = Cell {
-            quadrant: self.key.quadrant(),
-            level,
-            x: index(self.key.x(), i),
-            y: index(self.key.y(), j),
-        };
-        let triangles = cell.triangles();
-        [0, 1].map(|which: usize| {
-            triangles[which].map(|[u, v]| (i + usize::from(u / 2), j + usize::from(v / 2)))
-        })
     }
 
     /// Those edges of a cell that lie on the border.
@@ -307,8 +312,86 @@ impl Plate {
     }
 }
 
+/// The triangles of two by two cells all meet in the middle: diagonals join corners that are both
+/// even or both odd, and pages begin at even ones. This is the ring around it.
+const RING: [(usize, usize); 8] = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+const MIDDLE: (usize, usize) = (1, 1);
+
+/// Quarters of a square, counted as pages count their children.
+const KIDS: [(usize, usize); 4] = [(0, 0), (1, 0), (0, 1), (1, 1)];
+
+fn is_border(x: usize, y: usize) -> bool {
+    let last = (1 << LEAF_BITS) - 1;
+    x == 0 || y == 0 || x == last || y == last
+}
+
+/// Space sheared so that a ray runs along the third axis from its origin.
+struct Shear {
+    from: DVec3,
+    axes: [DVec3; 3],
+    per: f64,
+}
+
+impl Shear {
+    fn new(from: DVec3, direction: DVec3) -> Self {
+        let away = direction.abs();
+        let [x, y, z] = if away.z >= away.x && away.z >= away.y {
+            [DVec3::X, DVec3::Y, DVec3::Z]
+        } else if away.x >= away.y {
+            [DVec3::Y, DVec3::Z, DVec3::X]
+        } else {
+            [DVec3::Z, DVec3::X, DVec3::Y]
+        };
+        let per = 1.0 / direction.dot(z);
+        let slope = |axis: DVec3| axis - z * (direction.dot(axis) * per);
+        Self { from, axes: [slope(x), slope(y), z], per }
+    }
+
+    /// Where the ray first meets the triangles between a ring and its middle. Two triangles see
+    /// their common edge alike to the last bit: no ray slips through.
+    #[inline]
+    fn meet(&self, at: impl Fn((usize, usize)) -> DVec3, end: f64) -> Option<Meeting> {
+        let [right, up, _] = self.axes;
+        let middle = at(MIDDLE) - self.from;
+        let ring = RING.map(|of| at(of) - self.from);
+        let (x, y) = (middle.dot(right), middle.dot(up));
+        let (xs, ys) = (ring.map(|of| of.dot(right)), ring.map(|of| of.dot(up)));
+        let (mut spokes, mut rims) = ([0.0; 9], [0.0; 8]);
+        for i in 0..8 {
+            let next = (i + 1) % 8;
+            spokes[i] = x * ys[i] - y * xs[i];
+            rims[i] = xs[i] * ys[next] - ys[i] * xs[next];
+        }
+        spokes[8] = spokes[0];
+        let mut inside = 0_u32;
+        for i in 0..8 {
+            let sides = [rims[i], -spokes[i + 1], spokes[i]];
+            let left = (sides[0] >= 0.0) & (sides[1] >= 0.0) & (sides[2] >= 0.0);
+            let right = (sides[0] <= 0.0) & (sides[1] <= 0.0) & (sides[2] <= 0.0);
+            inside |= u32::from(left | right) << i;
+        }
+        let mut best: Option<Meeting> = None;
+        while inside != 0 {
+            let i = inside.trailing_zeros() as usize;
+            inside &= inside - 1;
+            let next = (i + 1) % 8;
+            let sides = [rims[i], -spokes[i + 1], spokes[i]];
+            let scale = 1.0 / (sides[0] + sides[1] + sides[2]);
+            let weights = sides.map(|side| side * scale);
+            let places = [middle, ring[i], ring[next]].map(|of| of.dot(self.axes[2]));
+            let along = weights[0] * places[0] + weights[1] * places[1] + weights[2] * places[2];
+            let t = along * self.per;
+            // NaN of a triangle seen edge-on fails this.
+            if t >= 0.0 && t <= best.map_or(end, |best| best.t) {
+                best = Some(Meeting { t, corners: [MIDDLE, RING[i], RING[next]], weights });
+            }
+        }
+        best
+    }
+}
+
 /// Moves the last of a falling list to its place.
-fn sink(list: &mut [(f64, u8, usize, usize)]) {
+fn sink(list: &mut [(f32, u8, u16)]) {
     for at in (1..list.len()).rev() {
         if list[at - 1].0 >= list[at].0 {
             return;
@@ -317,9 +400,25 @@ fn sink(list: &mut [(f64, u8, usize, usize)]) {
     }
 }
 
+/// Column and row of a square: squares are counted quarter by quarter.
+fn square(at: usize) -> (usize, usize) {
+    let every_second = |bits: usize| {
+        let bits = bits & 0x555;
+        let bits = (bits | bits >> 1) & 0x333;
+        let bits = (bits | bits >> 2) & 0xf0f;
+        (bits | bits >> 4) & 0xff
+    };
+    (every_second(at), every_second(at >> 1))
+}
+
+/// How many squares there are of less than so many bits.
+fn first_of(bits: u8) -> usize {
+    ((1_usize << (2 * bits)) - 1) / 3
+}
+
 /// Where the box of square (x, y) of 2^bits by 2^bits stands.
 fn place(bits: u8, x: usize, y: usize) -> usize {
-    ((1_usize << (2 * bits)) - 1) / 3 + (y << bits) + x
+    first_of(bits) + (y << bits) + x
 }
 
 /// Where a ray meets a triangle, from either side, and the weights of its corners.
@@ -346,4 +445,43 @@ fn meet_triangle(
     let t = ac.dot(q) * scale;
     // NaN of a triangle seen edge-on fails these as well.
     (v >= 0.0 && u + v <= 1.0 && t >= 0.0 && t <= end).then_some((t, [1.0 - u - v, u, v]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use overfly_core::ground::Cell;
+    use std::collections::BTreeSet;
+
+    fn half(of: u8) -> usize {
+        assert_eq!(of % 2, 0);
+        usize::from(of / 2)
+    }
+
+    #[test]
+    fn squares_are_counted_quarter_by_quarter() {
+        for at in 0..1024 {
+            let ((x, y), (px, py)) = (square(at), square(at / 4));
+            assert_eq!((x - 2 * px, y - 2 * py), KIDS[at % 4]);
+        }
+        assert_eq!(square(0), (0, 0));
+    }
+
+    #[test]
+    fn the_triangles_of_a_plate_are_those_of_the_lattice() {
+        let level = 2 * (3 + PAGE_BITS);
+        let own: BTreeSet<BTreeSet<(usize, usize)>> =
+            (0..8).map(|i| BTreeSet::from([MIDDLE, RING[i], RING[(i + 1) % 8]])).collect();
+        for (quadrant, x, y) in [(0, 0, 0), (1, 64, 128), (2, 62, 2), (3, 130, 388)] {
+            let of_cell = |(dx, dy): (usize, usize)| {
+                let [x, y] = [(x, dx), (y, dy)].map(|(at, d)| at + u32::try_from(d).unwrap());
+                let cell = Cell { quadrant, level, x, y };
+                // Corners are counted in halves of cells.
+                let place = move |of: [u8; 2]| (dx + half(of[0]), dy + half(of[1]));
+                cell.triangles().iter().map(move |of| BTreeSet::from(of.map(place)))
+            };
+            let all: BTreeSet<_> = KIDS.into_iter().flat_map(of_cell).collect();
+            assert_eq!(all, own);
+        }
+    }
 }

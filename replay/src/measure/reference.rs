@@ -1,25 +1,24 @@
 //! The ground that errors are measured against: plates as fine as the picture can show.
 //!
-//! In:    the projection of a frame; pages, made when they are needed.
-//! Out:   the plates of a frame; where rays meet them.
-//! Keeps: the plates of the last frames.
-//! Not here: a single plate (`plate`), what is made of the hits (`error`).
+//! In:    the eye of a frame; pages, made when a ray first needs them.
+//! Out:   where rays meet the ground.
+//! Keeps: the plates of the last frames, as a tree.
+//! Not here: a single plate (`plate`), the way of a ray (`nearby`), what is made of the hits.
 //!
-//! A plate is fine enough when its cells look no larger than a stated share of a pixel; a coarser
-//! one is halved into four. What the reference itself leaves out is stated, not hidden: the page's
-//! own bound of what its triangles miss, and a sample of it that `error` measures.
+//! A plate is fine enough when its cells look no larger than a stated share of a pixel; in place of
+//! a coarser one stand its four children. Rays choose: a child is made when the first ray enters
+//! the box around all that it may have before it has met nearer ground. So what lies behind ridges
+//! is never made, and what a ray meets hangs on that ray and the eye alone, in whatever order and
+//! on whatever thread rays are cast. What the reference itself leaves out is stated, not hidden:
+//! what lies below its cells.
 
-use super::plate::{Box3, Meeting, Plate};
-use super::screen::Screen;
+use super::plate::{Meeting, Plate};
 use glam::DVec3;
 use overfly_core::datasource::{Page, PageKey};
 use overfly_core::geodesy::Ellipsoid;
 use overfly_core::ground::LEVEL_MAX;
-use overfly_core::lod::screen_error::Horizon;
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Makes pages: any thread may ask; `None` where it cannot be made.
 pub type MakePage<'a> = &'a (dyn Fn(PageKey) -> Option<Arc<Page>> + Sync);
@@ -27,7 +26,7 @@ pub type MakePage<'a> = &'a (dyn Fn(PageKey) -> Option<Arc<Page>> + Sync);
 /// Plates that were not needed for this many measured frames are dropped.
 const IDLE_FRAMES: u64 = 90;
 /// No deeper pages: their level is the last.
-const DEPTH_LAST: u8 = LEVEL_MAX / 2 - 6;
+pub(super) const DEPTH_LAST: u8 = LEVEL_MAX / 2 - 6;
 
 /// The reference ground of a scene.
 pub struct Reference {
@@ -35,27 +34,20 @@ pub struct Reference {
     sea: bool,
     /// A cell looks no larger than this, in pixels.
     cell_px: f64,
-    threads: usize,
-    plates: BTreeMap<PageKey, Kept>,
+    roots: [Node; 4],
     frame: u64,
-    /// Plates of this frame, the nearest first.
-    shown: Vec<Shown>,
     /// Pages that could not be made in this frame: the ground is coarser there.
-    pub missing: usize,
+    missing: AtomicU64,
+    made: AtomicU64,
 }
 
-struct Kept {
-    plate: Arc<Plate>,
-    used: u64,
-}
-
-/// A plate that this frame may see.
-struct Shown {
-    plate: Arc<Plate>,
-    eye: DVec3,
-    nearest_m: f64,
-    centre: DVec3,
-    radius_m: f64,
+/// A plate that may be made.
+pub(super) struct Node {
+    pub(super) key: PageKey,
+    used: AtomicU64,
+    /// `None` where the page cannot be made.
+    plate: OnceLock<Option<Box<Plate>>>,
+    kids: OnceLock<Box<[Node; 4]>>,
 }
 
 /// Where a ray met the ground.
@@ -71,202 +63,106 @@ pub struct Hit {
     pub height_m: f64,
 }
 
-/// The plates that some tile of the picture may show.
-pub struct Nearby(Vec<u32>);
+impl Node {
+    fn new(key: PageKey) -> Self {
+        Self { key, used: AtomicU64::new(0), plate: OnceLock::new(), kids: OnceLock::new() }
+    }
+
+    pub(super) fn kids(&self) -> &[Self; 4] {
+        self.kids.get_or_init(|| Box::new([0, 1, 2, 3].map(|at| Self::new(self.key.child(at)))))
+    }
+
+    /// Drops what was not used since, and what could not be made: that is tried again.
+    fn forget(&mut self, oldest: u64) {
+        if self.plate.get().is_some_and(Option::is_none) {
+            self.plate = OnceLock::new();
+        }
+        let Some(kids) = self.kids.get_mut() else { return };
+        if kids.iter().all(|kid| kid.used.load(Ordering::Relaxed) < oldest) {
+            self.kids = OnceLock::new();
+        } else {
+            kids.iter_mut().for_each(|kid| kid.forget(oldest));
+        }
+    }
+}
 
 impl Reference {
     /// Nothing yet.
-    pub fn new(body: Ellipsoid, sea: bool, cell_px: f64, threads: usize) -> Self {
-        let (plates, shown) = (BTreeMap::new(), Vec::new());
-        Self { body, sea, cell_px, threads, plates, frame: 0, shown, missing: 0 }
+    pub fn new(body: Ellipsoid, sea: bool, cell_px: f64) -> Self {
+        let roots = [0, 1, 2, 3].map(|quadrant| Node::new(PageKey::root(quadrant)));
+        let (missing, made) = (AtomicU64::new(0), AtomicU64::new(0));
+        Self { body, sea, cell_px, roots, frame: 0, missing, made }
     }
 
-    /// Plates that are kept.
-    pub fn plates(&self) -> usize {
-        self.plates.len()
+    /// Plates that were ever made.
+    pub fn made(&self) -> u64 {
+        self.made.load(Ordering::Relaxed)
     }
 
-    /// Plates that this frame may see.
-    pub fn shown(&self) -> usize {
-        self.shown.len()
+    /// Pages that some ray of this frame needed and that could not be made: the ground is coarser
+    /// there.
+    pub fn missing(&self) -> u64 {
+        self.missing.load(Ordering::Relaxed)
     }
 
-    /// Gathers the plates of a frame.
-    pub fn gather(&mut self, screen: &Screen, make: MakePage<'_>) {
+    /// Begins a frame.
+    pub fn begin(&mut self) {
         self.frame += 1;
-        self.missing = 0;
-        self.shown.clear();
-        let mut wave: Vec<PageKey> = (0..4).map(PageKey::root).collect();
-        let mut floor_m = 0.0_f64;
-        while !wave.is_empty() {
-            self.load(&wave, make);
-            let mut next = Vec::new();
-            if wave[0].depth() == 0 {
-                let roots = wave.iter().filter_map(|key| self.plates.get(key));
-                floor_m =
-                    roots.map(|kept| kept.plate.low_m - kept.plate.error_max_m).fold(0.0, f64::min);
-            }
-            let horizon = Horizon::new(&self.body, [floor_m.max(-0.5 * self.body.b_m()), 0.0]);
-            for key in &wave {
-                self.show_or_split(*key, (screen, &horizon), &mut next);
-            }
-            wave = next;
-        }
-        self.shown.sort_by(|a, b| a.nearest_m.total_cmp(&b.nearest_m));
+        self.missing = AtomicU64::new(0);
         let oldest = self.frame.saturating_sub(IDLE_FRAMES);
-        self.plates.retain(|_, kept| kept.used >= oldest);
+        self.roots.iter_mut().for_each(|root| root.forget(oldest));
     }
 
-    /// Shows a plate, or finds its children where it is too coarse. A page that cannot be made is
-    /// stood in for by its parent.
-    fn show_or_split(&mut self, key: PageKey, eyes: (&Screen, &Horizon), next: &mut Vec<PageKey>) {
-        let Some(kept) = self.plates.get_mut(&key) else {
-            let parent = key.parent().and_then(|parent| self.plates.get(&parent));
-            let stand_in = parent.map(|kept| kept.plate.clone());
-            stand_in.into_iter().for_each(|plate| self.show(plate, eyes.0));
-            return;
-        };
-        kept.used = self.frame;
-        let plate = kept.plate.clone();
-        if !self.split(&plate, eyes, next) {
-            self.show(plate, eyes.0);
+    /// A page, if it was made for a plate that is still kept.
+    pub fn page(&self, key: PageKey) -> Option<Arc<Page>> {
+        let mut node = &self.roots[usize::from(key.quadrant())];
+        for depth in (0..key.depth()).rev() {
+            let bit = |of: u32| (of >> depth & 1) as usize;
+            node = &node.kids.get()?[2 * bit(key.y()) + bit(key.x())];
         }
+        node.plate.get()?.as_ref().map(|plate| plate.page.clone())
     }
 
-    /// Whether a plate is too coarse for where it lies; then its children are due.
-    fn split(
-        &mut self,
-        plate: &Plate,
-        (screen, horizon): (&Screen, &Horizon),
-        next: &mut Vec<PageKey>,
-    ) -> bool {
-        let eye = plate.local(screen.eye);
-        let nearest_m = plate.whole().distance(eye).max(screen.near_m);
-        let cell_px = plate.cell_m * screen.scale_px / nearest_m;
-        if cell_px <= self.cell_px || plate.key.depth() >= DEPTH_LAST {
-            return false;
-        }
-        let planes = side_planes(screen).map(|plane| plate.axes * plane);
-        let eye_up_m = self.body.geodetic_from_ecef(overfly_core::geodesy::Ecef(screen.eye));
-        let below = eye_up_m.height_m <= horizon.floor_m;
-        let high_m = plate.high_m + plate.error_max_m;
-        let reach_m = horizon.tangent_m(eye_up_m.height_m) + horizon.tangent_m(high_m);
-        for index in 0..4 {
-            let around = plate.quarter(index).grown(plate.error_max_m);
-            let seen = planes.iter().all(|plane| farthest(&around, *plane, eye) >= 0.0);
-            if seen && (below || around.distance(eye) <= reach_m) {
-                next.push(plate.key.child(index));
-            }
-        }
-        true
-    }
-
-    fn show(&mut self, plate: Arc<Plate>, screen: &Screen) {
-        let eye = plate.local(screen.eye);
-        let whole = plate.whole();
-        let middle = (whole.low + whole.high) * 0.5;
-        self.shown.push(Shown {
-            eye,
-            nearest_m: whole.distance(eye),
-            centre: plate.origin + plate.axes.transpose() * middle,
-            radius_m: (whole.high - middle).length(),
-            plate,
+    /// The plate of a node, made now if it must be.
+    pub(super) fn plate<'a>(&self, node: &'a Node, make: MakePage<'_>) -> Option<&'a Plate> {
+        node.used.store(self.frame, Ordering::Relaxed);
+        let plate = node.plate.get_or_init(|| {
+            let page = make(node.key);
+            let count = if page.is_some() { &self.made } else { &self.missing };
+            count.fetch_add(1, Ordering::Relaxed);
+            page.map(|page| Box::new(Plate::new(page, &self.body, self.sea)))
         });
+        plate.as_deref()
     }
 
-    /// Makes what is missing of a wave, on all threads.
-    fn load(&mut self, wave: &[PageKey], make: MakePage<'_>) {
-        let missing: Vec<PageKey> =
-            wave.iter().filter(|key| !self.plates.contains_key(key)).copied().collect();
-        let (made, next) = (Mutex::new(Vec::new()), AtomicUsize::new(0));
-        let work = || {
-            while let Some(&key) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let plate = make(key).map(|page| Plate::new(&page, &self.body, self.sea));
-                let mut made = made.lock().unwrap_or_else(PoisonError::into_inner);
-                made.push((key, plate));
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 1..self.threads.min(missing.len()).max(1) {
-                scope.spawn(work);
-            }
-            work();
-        });
-        for (key, plate) in made.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            match plate {
-                Some(plate) => {
-                    self.plates.insert(key, Kept { plate: Arc::new(plate), used: self.frame });
-                }
-                None => self.missing += 1,
-            }
-        }
+    pub(super) fn roots(&self) -> impl Iterator<Item = &Node> {
+        self.roots.iter()
     }
 
-    /// The plates that some rays may meet, given the planes around them.
-    pub fn nearby(&self, eye: DVec3, planes: &[DVec3; 4]) -> Nearby {
-        let meets = |shown: &Shown| {
-            let away = shown.centre - eye;
-            planes.iter().all(|plane| plane.dot(away) >= -shown.radius_m)
-        };
-        let found = (0_u32..).zip(&self.shown).filter(|(_, shown)| meets(shown));
-        Nearby(found.map(|(at, _)| at).collect())
+    pub(super) fn body(&self) -> &Ellipsoid {
+        &self.body
     }
 
-    /// Where a ray first meets the ground; `direction` has depth 1.
-    pub fn meet(&self, nearby: &Nearby, eye: DVec3, direction: DVec3) -> Option<Hit> {
-        let mut best: Option<(Meeting, &Plate)> = None;
-        let mut end = f64::INFINITY;
-        let length = direction.length();
-        for &at in &nearby.0 {
-            let shown = &self.shown[at as usize];
-            if shown.nearest_m > end * length {
-                break;
-            }
-            let away = shown.centre - eye;
-            let along = away.dot(direction) / (length * length);
-            let beside = (away - direction * along).length_squared();
-            if beside > shown.radius_m * shown.radius_m {
-                continue;
-            }
-            let local = shown.plate.axes * direction;
-            if let Some(found) = shown.plate.meet(shown.eye, local, end) {
-                end = found.t;
-                best = Some((found, &shown.plate));
-            }
-        }
-        best.map(|(found, plate)| self.hit(&found, plate))
+    pub(super) fn cell_px(&self) -> f64 {
+        self.cell_px
     }
 
     /// The place of a meeting: its normal is that of its weights on the lattice, and its height
     /// where the vertical there meets the triangle's plane.
-    fn hit(&self, found: &Meeting, plate: &Plate) -> Hit {
+    pub(super) fn hit(&self, found: &Meeting, plate: &Plate) -> Hit {
         let points = found.corners.map(|(i, j)| plate.key.sample(i, j).as_dvec3());
         let [wa, wb, wc] = found.weights;
         let normal = (points[0] * wa + points[1] * wb + points[2] * wc).normalize();
         let foot = self.body.surface_from_normal(normal);
         let [a, b, c] = found.corners.map(|corner| plate.corner(corner));
         let plane = (b - a).cross(c - a);
-        let level_m = found.corners.map(|corner| plate.surface_m(corner));
         let height_m = if plane == DVec3::ZERO {
             // Below an edge: a skirt.
-            level_m[0] * wa + level_m[1] * wb
+            let [from_m, to_m, _] = found.corners.map(|corner| plate.surface_m(corner));
+            from_m * wa + to_m * wb
         } else {
             (a - foot).dot(plane) / normal.dot(plane)
         };
         Hit { depth_m: found.t, normal, place: foot + normal * height_m, height_m }
     }
-}
-
-/// The four planes through the eye that bound the picture, pointing inward.
-fn side_planes(screen: &Screen) -> [DVec3; 4] {
-    let [right, up, forward] = screen.axes;
-    let [x, y] = screen.size_px.map(|size_px| 0.5 * size_px / screen.scale_px);
-    [forward * x + right, forward * x - right, forward * y + up, forward * y - up]
-        .map(DVec3::normalize)
-}
-
-/// Greatest value of a plane through `eye` over a box.
-fn farthest(around: &Box3, plane: DVec3, eye: DVec3) -> f64 {
-    let (a, b) = ((around.low - eye) * plane, (around.high - eye) * plane);
-    a.max(b).element_sum()
 }

@@ -49,6 +49,8 @@ const OCTAVES: i32 = 60;
 #[derive(Clone, PartialEq, Debug)]
 pub struct Gathered {
     bins: Vec<u64>,
+    /// Upper ends of an octave's bins, from 1 to 2.
+    ends: Vec<f64>,
     count: u64,
     squares: f64,
     max: f64,
@@ -58,7 +60,8 @@ pub struct Gathered {
 impl Default for Gathered {
     fn default() -> Self {
         let bins = vec![0; 2 * OCTAVES.unsigned_abs() as usize * BINS + 1];
-        Self { bins, count: 0, squares: 0.0, max: 0.0, at: Where::default() }
+        let ends = (0..=BINS).map(|bin| libm::exp2(bin as f64 / BINS as f64)).collect();
+        Self { bins, ends, count: 0, squares: 0.0, max: 0.0, at: Where::default() }
     }
 }
 
@@ -70,10 +73,19 @@ impl Spread {
         let Some(greatest) = greatest else { return Self::default() };
         let at = at(greatest);
         let rms = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
-        values.sort_unstable_by(f64::total_cmp);
-        let rank = |permille: usize| values[(values.len() * permille).div_ceil(1000).max(1) - 1];
+        let count = values.len();
+        let mut sorted = 0;
+        let mut rank = |permille: usize| {
+            let rank = (count * permille).div_ceil(1000).max(1) - 1;
+            // What is before the last rank is less: each one is looked for in what is left.
+            if rank >= sorted {
+                values[sorted..].select_nth_unstable_by(rank - sorted, f64::total_cmp);
+                sorted = rank + 1;
+            }
+            values[rank]
+        };
         Self {
-            count: values.len() as u64,
+            count: count as u64,
             rms,
             p50: rank(500),
             p95: rank(950),
@@ -108,7 +120,7 @@ impl Gathered {
     /// Adds the values of a frame and its spread.
     pub fn add(&mut self, values: &[f64], spread: &Spread) {
         for &value in values {
-            self.bins[bin_of(value)] += 1;
+            self.bins[bin_of(value, &self.ends)] += 1;
             self.squares += value * value;
         }
         self.count += values.len() as u64;
@@ -144,15 +156,18 @@ impl Gathered {
     }
 }
 
-fn bin_of(value: f64) -> usize {
+/// The bin of a value, given the ends of an octave's bins.
+fn bin_of(value: f64, ends: &[f64]) -> usize {
     if value <= 0.0 {
         return 0;
     }
-    let place = (libm::log2(value) + f64::from(OCTAVES)) * BINS as f64;
-    let last = 2 * OCTAVES.unsigned_abs() as usize * BINS;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-    let bin = place.ceil().clamp(0.0, last as f64) as usize;
-    bin
+    let bits = value.to_bits();
+    let octave = i64::try_from(bits >> 52).expect("eleven bits") - 1023 + i64::from(OCTAVES);
+    let within = f64::from_bits(bits & ((1 << 52) - 1) | 1023 << 52);
+    let bin = ends.partition_point(|&end| end < within);
+    let last = 2 * i64::from(OCTAVES) * BINS as i64;
+    let bin = octave.saturating_mul(BINS as i64) + bin as i64;
+    usize::try_from(bin.clamp(0, last)).expect("clamped")
 }
 
 fn upper_end(bin: usize) -> f64 {

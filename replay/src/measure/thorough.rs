@@ -37,17 +37,34 @@ pub(super) fn measure(measure: &Measure, shot: &Shot<'_>, due: [bool; 2]) -> Opt
         return None;
     }
     let mut all = Thorough::default();
-    (all.e4_px, all.e4_lost) = outline::measure(measure, shot);
-    let cracks = cracks::Cracks::of(&measure.now.drawn);
-    (all.c1_edges, all.c2_junctions) = (cracks.edges, cracks.junctions);
-    all.c3_points = cracks::points_apart(&mut cracks::uploaded(shot.terrain, shot.output));
-    all.h1_m = heights::queries(measure, shot);
-    [all.h2_gear_m, all.h2_near_m, all.h2_far_m, all.h2_step_m] = heights::mesh(measure, shot);
-    [all.m32_px, all.f32_px] = pipeline::arithmetic(measure, shot);
-    (all.j1_px, all.j1_step_px) = pipeline::jitter(measure, shot);
-    all.depths = depth::measure(measure, shot);
-    if cross {
-        all.cross = cross::measure(measure, shot);
+    let of_pages = |all: &mut Thorough| {
+        if cross {
+            all.cross = cross::measure(measure, shot);
+        }
+        all.h1_m = heights::queries(measure, shot);
+        [all.h2_gear_m, all.h2_near_m, all.h2_far_m, all.h2_step_m] = heights::mesh(measure, shot);
+    };
+    let of_mesh = |all: &mut Thorough| {
+        (all.e4_px, all.e4_lost) = outline::measure(measure, shot);
+        let cracks = cracks::Cracks::of(&measure.now.drawn);
+        (all.c1_edges, all.c2_junctions) = (cracks.edges, cracks.junctions);
+        all.c3_points = cracks::points_apart(&mut cracks::uploaded(shot.terrain, shot.output));
+        [all.m32_px, all.f32_px] = pipeline::arithmetic(measure, shot);
+        (all.j1_px, all.j1_step_px) = pipeline::jitter(measure, shot);
+        all.depths = depth::measure(measure, shot);
+    };
+    // Making pages takes about as long as all the rest.
+    if measure.settings.threads > 1 {
+        let mut pages = Thorough::default();
+        std::thread::scope(|scope| {
+            scope.spawn(|| of_pages(&mut pages));
+            of_mesh(&mut all);
+        });
+        let Thorough { cross, h1_m, h2_gear_m, h2_near_m, h2_far_m, h2_step_m, .. } = pages;
+        all = Thorough { cross, h1_m, h2_gear_m, h2_near_m, h2_far_m, h2_step_m, ..all };
+    } else {
+        of_pages(&mut all);
+        of_mesh(&mut all);
     }
     Some(all)
 }

@@ -63,7 +63,8 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = MORE)]
 pub struct Arguments {
-    /// A bundled flight (rainier, descent, poles) or an .ovf file of poses.
+    /// A bundled flight (rainier, descent, poles), an .ovf file of poses, or one
+    /// that `import` reads.
     flight: String,
     /// Values to try, RON; see below.
     #[arg(long, value_name = "FILE")]

@@ -65,8 +65,8 @@ enum Verify {
 #[command(after_help = MORE,
           group = clap::ArgGroup::new("goal").required(true).args(["error_px", "budget_ms"]))]
 pub struct Arguments {
-    /// A bundled flight (rainier, descent, poles) or an .ovf file of poses. [default: that of
-    /// --from, else rainier]
+    /// A bundled flight (rainier, descent, poles), an .ovf file of poses, or one
+    /// that `import` reads. [default: that of --from, else rainier]
     flight: Option<String>,
     /// The error that may be, in pixels.
     #[arg(long, value_name = "PX", value_parser = positive)]

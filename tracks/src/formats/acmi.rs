@@ -1,0 +1,177 @@
+//! Tacview's ACMI 2.x, as text.
+//!
+//! In:    the text of a file.
+//! Out:   a fix each time that an object is given a place; each object is a recording.
+//! Keeps: nothing.
+//! Not here: unpacking (`format`), events, everything of an object but its place and name.
+//! Source: Raia Software, "Technical Reference, ACMI flight recordings 2.2".
+//!
+//! By hand: the crate `tacview` 0.2 does not compile with today's `zip`, and gives no columns.
+
+use crate::clock::{self, SECOND_NS};
+use crate::fault::{TrackError, Wrong};
+use crate::fixes::{Datum, Fix, Said, Sink};
+use std::collections::BTreeMap;
+
+/// Most seconds of a frame: a year.
+const FRAME_S: f64 = 31_536_000.0;
+
+/// What is known of an object: places are written only as far as they change.
+#[derive(Clone, Copy)]
+struct Object {
+    track: u32,
+    /// Longitude, latitude (with the reference's added), metres, roll, pitch, yaw.
+    place: [f64; 6],
+}
+
+#[derive(Default)]
+struct Scene {
+    objects: BTreeMap<u64, Object>,
+    /// UTC of frame 0.
+    start_ns: i64,
+    /// The frame, since the start.
+    frame_ns: i64,
+    reference_deg: [f64; 2],
+}
+
+pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
+    let mut scene = Scene::default();
+    sink.fixes.said = Said::Declared(Datum::Msl, "Tacview's files are by definition".into());
+    // A backslash at the end of a line goes on with the value: such lines hold no place.
+    let mut continues = false;
+    for line in sink.text.lines() {
+        let within = continues;
+        continues = line.ends_with('\\');
+        if within {
+            continue;
+        }
+        match record(sink, &mut scene, line) {
+            Ok(Some(fix)) => sink.push(fix)?,
+            Ok(None) => {}
+            Err(wrong) => sink.bad(wrong),
+        }
+    }
+    Ok(())
+}
+
+fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<Fix>, Wrong> {
+    let at = sink.text.offset(line);
+    if let Some(seconds) = line.strip_prefix('#') {
+        let value = sink.number("frame", seconds, -FRAME_S..=FRAME_S)?;
+        #[expect(clippy::cast_possible_truncation, reason = "at most 4e16, by the range above")]
+        let ns = (value * SECOND_NS as f64).round() as i64;
+        scene.frame_ns = ns;
+        return Ok(None);
+    }
+    if let Some(id) = line.strip_prefix('-') {
+        let id = u64::from_str_radix(id.trim(), 16).ok();
+        id.and_then(|id| scene.objects.remove(&id));
+        return Ok(None);
+    }
+    let mut parts = properties(line);
+    let Some(id) = parts.next() else { return Ok(None) };
+    let Ok(id) = u64::from_str_radix(id.trim(), 16) else {
+        let is_header =
+            line.is_empty() || line.starts_with("FileType") || line.starts_with("FileV");
+        let is_comment = is_header || line.starts_with("//");
+        let wrong = || Wrong::new(at, "object", id, "a hexadecimal number");
+        return if is_comment { Ok(None) } else { Err(wrong()) };
+    };
+    let mut place = None;
+    let mut name = None;
+    for part in parts {
+        match part.split_once('=') {
+            Some(("T", value)) => place = Some(value),
+            Some(("Name" | "CallSign" | "Pilot", value)) if name.is_none() => name = Some(value),
+            Some((key, value)) if id == 0 => global(sink, scene, key, value)?,
+            _ => {}
+        }
+    }
+    let Some(place) = place else { return Ok(None) };
+    let object = scene.objects.get(&id).copied().unwrap_or_else(|| {
+        let track = u32::try_from(sink.fixes.names.len()).unwrap_or(u32::MAX);
+        sink.fixes.names.push(name.map_or_else(|| format!("{id:x}"), str::to_owned));
+        let none = f64::NAN;
+        Object { track, place: [none; 6] }
+    });
+    let object = placed(sink, scene, object, place)?;
+    scene.objects.insert(id, object);
+    let mut fix = Fix::new(object.track, scene.start_ns + scene.frame_ns, at);
+    let [lon, lat, height, roll, pitch, yaw] = object.place;
+    if !(lon.is_finite() && lat.is_finite()) {
+        sink.fixes.without_position += 1;
+        return Ok(None);
+    }
+    (fix.lon_deg, fix.lat_deg, fix.height_m) = (lon, lat, height);
+    fix.attitude_deg = [yaw, pitch, roll];
+    Ok(Some(fix))
+}
+
+fn global(sink: &Sink<'_>, scene: &mut Scene, key: &str, value: &str) -> Result<(), Wrong> {
+    match key {
+        "ReferenceTime" => {
+            let at = sink.text.offset(value);
+            let wrong = || Wrong::new(at, key, value, "a time, as 2024-07-15T09:00:00Z");
+            scene.start_ns = clock::iso(value).ok_or_else(wrong)?.ns;
+        }
+        "ReferenceLongitude" => {
+            scene.reference_deg[0] = sink.number(key, value, -360.0..=360.0)?;
+        }
+        "ReferenceLatitude" => scene.reference_deg[1] = sink.number(key, value, -180.0..=180.0)?,
+        _ => {}
+    }
+    Ok(())
+}
+
+/// The object with the parts of its place that a `T=` has.
+fn placed(
+    sink: &mut Sink<'_>,
+    scene: &Scene,
+    mut object: Object,
+    text: &str,
+) -> Result<Object, Wrong> {
+    let parts: Vec<&str> = text.split('|').collect();
+    let columns: &[usize] = match parts.len() {
+        3 | 5 => &[0, 1, 2],
+        6 | 9 => &[0, 1, 2, 3, 4, 5],
+        count => {
+            let found = format!("{count} parts");
+            return Err(Wrong::new(sink.text.offset(text), "T", &found, "3, 5, 6 or 9 parts"));
+        }
+    };
+    for &column in columns {
+        let part = parts[column].trim();
+        let at = sink.text.offset(part);
+        if part.is_empty() {
+            continue;
+        }
+        let value = match column {
+            0 => sink.lon_offset(part, at)? + scene.reference_deg[0],
+            1 => {
+                let sum = sink.lat_offset(part, at)? + scene.reference_deg[1];
+                if sum.abs() > 90.0 {
+                    return Err(Wrong::new(at, "latitude", part, "-90 to 90 with the reference's"));
+                }
+                sum
+            }
+            2 => sink.height_at(part, at)?,
+            _ => sink.angle_at(["roll", "pitch", "yaw"][column - 3], part, at)?,
+        };
+        object.place[column] = value;
+    }
+    Ok(object)
+}
+
+/// The parts between commas that no backslash stands before.
+fn properties(line: &str) -> impl Iterator<Item = &str> {
+    let mut rest = Some(line);
+    core::iter::from_fn(move || {
+        let text = rest?;
+        let is_end = |(at, byte): &(usize, u8)| {
+            *byte == b',' && !(*at > 0 && text.as_bytes()[at - 1] == b'\\')
+        };
+        let end = text.bytes().enumerate().find(is_end).map(|(at, _)| at);
+        rest = end.map(|end| &text[end + 1..]);
+        Some(&text[..end.unwrap_or(text.len())])
+    })
+}
