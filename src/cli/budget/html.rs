@@ -203,16 +203,18 @@ fn worst_table(
         out,
         format_args!(
             "<h2>Worst frames</h2>\n<p>Those {what}; of neighbours one. Stages are those of the \
-             first run.</p>\n<div class=\"wide\"><table><tr><th class=\"l\">where</th><th>{}</th>",
-            if timed { "ms" } else { "triangles" }
+             first run.</p>\n<div class=\"wide\"><table><tr><th class=\"l\">where</th>{}",
+            if timed { "<th>ms</th>" } else { "" }
         ),
     );
     let names = stages.iter().map(|(name, _)| name.as_str()).chain(counted);
     names.for_each(|name| put(out, format_args!("<th>{}</th>", escaped(name))));
     put(out, format_args!("</tr>\n"));
     for &frame in worst {
-        let (place, value) = (escaped(&record.place(frame)), number(by[frame]));
-        put(out, format_args!("<tr><td class=\"w\">{place}</td><td>{value}</td>"));
+        put(out, format_args!("<tr><td class=\"w\">{}</td>", escaped(&record.place(frame))));
+        if timed {
+            put(out, format_args!("<td>{}</td>", number(by[frame])));
+        }
         for (_, column) in stages {
             put(out, format_args!("<td>{:.3}</td>", column[frame]));
         }
@@ -227,18 +229,21 @@ fn worst_table(
 
 fn facts(out: &mut String, record: &RunRecord) {
     let f = &record.facts;
+    // Where nothing was timed nothing is said of the machine either.
+    let machine = if f.cores == 0 {
+        String::new()
+    } else {
+        let (profile, platform) = (escaped(&f.profile), escaped(&f.platform));
+        let (workers, cores, processor) = (f.workers, f.cores, escaped(&f.processor));
+        format!(", {profile} build, {workers} workers, {cores} cores, {platform} {processor}")
+    };
     put(
         out,
         format_args!(
-            "<h2>The run</h2>\n<p>{}, {} build, {} workers, {} cores, {} {}. Flight \
+            "<h2>The run</h2>\n<p>{}{machine}. Flight \
              <code>{}</code> over <code>{}</code> (settings {}), {} frames from {} at {} Hz, \
              pictures of {}×{} pixels.</p>\n<ul>\n",
             escaped(&f.program),
-            escaped(&f.profile),
-            f.workers,
-            f.cores,
-            escaped(&f.platform),
-            escaped(&f.processor),
             escaped(&f.flight),
             escaped(&f.scene),
             escaped(&f.settings_digest),
@@ -250,15 +255,19 @@ fn facts(out: &mut String, record: &RunRecord) {
         ),
     );
     for (run, cold) in record.cold_starts.iter().enumerate() {
+        let (total_ms, longest_ms) = (cold.total_ns as f64 / 1e6, cold.max_ns as f64 / 1e6);
+        let took = if cold.total_ns == 0 {
+            String::new()
+        } else {
+            format!(", {total_ms:.1} ms together, the longest {longest_ms:.3} ms")
+        };
         put(
             out,
             format_args!(
-                "<li>Run {}: the terrain came up in {} frames, {:.1} ms together, the longest \
-                 {:.3} ms; none of them is in any number above.</li>\n",
+                "<li>Run {}: the terrain came up in {} frames{took}; none of them is in any number \
+                 above.</li>\n",
                 run + 1,
-                cold.frames,
-                cold.total_ns as f64 / 1e6,
-                cold.max_ns as f64 / 1e6
+                cold.frames
             ),
         );
     }
