@@ -194,6 +194,15 @@ impl Sources {
         self.page_with(key, None)
     }
 
+    /// Makes a page without normals and bounds, for who reads heights alone: see
+    /// [`Generator::bare_page_from`]. Blocks while tiles are read.
+    ///
+    /// # Errors
+    /// A tile cannot be had or is damaged.
+    pub fn bare_page(&self, key: PageKey) -> Result<Arc<Page>, SourceError> {
+        Ok(self.generator.bare_page_from(key, &self.tiles(key)?))
+    }
+
     /// Makes a page with its colour. Where imagery cannot be had the page comes without any, for
     /// the ground must not wait for it, and why comes with it. Blocks while tiles are read.
     ///
@@ -269,9 +278,13 @@ impl Sources {
         key: PageKey,
         colour: Option<Arc<ColourTile>>,
     ) -> Result<Arc<Page>, SourceError> {
+        Ok(self.generator.page_with(key, &self.tiles(key)?, colour))
+    }
+
+    /// The tiles that a page is made from.
+    fn tiles(&self, key: PageKey) -> Result<Vec<Option<Arc<Tile>>>, SourceError> {
         let needs = self.generator.needs(key);
-        let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
-        Ok(self.generator.page_with(key, &tiles.collect::<Result<Vec<_>, _>>()?, colour))
+        needs.into_iter().map(|Need { archive, key }| self.tile(archive, key)).collect()
     }
 
     /// Height of the ground itself above the ellipsoid, at the lattice point next to a place.
@@ -291,9 +304,7 @@ impl Sources {
         let x = if x.abs() + y.abs() > RADIUS { x.signum() * (RADIUS - y.abs()) } else { x };
         let point = IVec3::new(x, y, if z < 0.0 { -rest } else { rest });
         let key = cell_of(point, DEPTH_MAX);
-        let needs = self.generator.needs(key);
-        let tiles = needs.into_iter().map(|Need { archive, key }| self.tile(archive, key));
-        Ok(self.generator.ground_m(key, point, &tiles.collect::<Result<Vec<_>, _>>()?))
+        Ok(self.generator.ground_m(key, point, &self.tiles(key)?))
     }
 
     /// Level of the finest data that is seen at a place; `None` where no archive has any.

@@ -556,3 +556,16 @@ fn normals_are_those_of_the_planes() {
         assert!(plane.dot(height.normal).abs() > 1.0 - 1e-9, "{plane} {}", height.normal);
     }
 }
+
+#[test]
+fn a_bare_page_has_the_samples_of_the_whole_one_and_knows_nothing_between_them() {
+    let generator = Generator::new(&scene(4, 1000));
+    for key in [PageKey::root(2), PageKey::new(0, 3, 5, 2), PageKey::new(1, 14, 9000, 77)] {
+        let (whole, bare) = (generator.page(key), generator.bare_page_from(key, &[]));
+        assert_eq!(bare.key, key);
+        assert_eq!(bare.heights_m.map(f32::to_bits), whole.heights_m.map(f32::to_bits));
+        assert!(bare.bounds.iter().all(|bound| bound.variation_m == f32::INFINITY));
+        assert!(bare.bounds.iter().all(|bound| bound.error_even_m == f32::INFINITY));
+        assert!(whole.bounds.iter().all(|bound| bound.error_odd_m.is_finite()));
+    }
+}

@@ -25,7 +25,7 @@ use overfly_replay::measure::heights::answer_error_m;
 use overfly_replay::measure::mesh::MeshThen;
 use overfly_replay::measure::pipeline::{Pipeline, in_picture, tremble};
 use overfly_replay::measure::screen::Screen;
-use overfly_replay::measure::{FlightErrors, Measure, MeasureSettings, cracks};
+use overfly_replay::measure::{FlightErrors, Measure, MeasureSettings, PagePart, cracks};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -37,7 +37,7 @@ struct Stand {
     terrain: Terrain,
     output: FrameOutput,
     /// Pages that were made: making them is most of what these tests do.
-    pages: Mutex<BTreeMap<PageKey, Arc<Page>>>,
+    pages: Mutex<BTreeMap<(PageKey, PagePart), Arc<Page>>>,
 }
 
 /// Of the whole planet.
@@ -110,9 +110,13 @@ impl Stand {
         rays: u32,
         spoil: impl FnOnce(&mut MeshThen, &Measure),
     ) -> FlightErrors {
-        let make = |key: PageKey| -> Option<Arc<Page>> {
+        let make = |key: PageKey, part: PagePart| -> Option<Arc<Page>> {
             let mut pages = self.pages.lock().unwrap();
-            Some(pages.entry(key).or_insert_with(|| self.generator.page(key)).clone())
+            let page = || match part {
+                PagePart::Heights => self.generator.bare_page_from(key, &[]),
+                PagePart::Whole => self.generator.page(key),
+            };
+            Some(pages.entry((key, part)).or_insert_with(page).clone())
         };
         let settings = MeasureSettings {
             rays,
@@ -142,7 +146,7 @@ fn any_number_of_threads_measures_the_same_and_a_stopped_frame_is_none() {
     let mut measure = Measure::new(&stand.terrain, MeasureSettings::default());
     measure.stop_on(Arc::new(AtomicBool::new(true)));
     let (frame, mut flight) = ((&stand.terrain, &stand.output), FlightErrors::default());
-    assert!(!measure.frame(frame, 0, &|key| Some(stand.generator.page(key)), &mut flight));
+    assert!(!measure.frame(frame, 0, &|key, _| Some(stand.generator.page(key)), &mut flight));
     assert!(flight.frames.is_empty());
 }
 

@@ -8,12 +8,15 @@
 use super::Failure;
 use super::source::Source;
 use overfly::Overfly;
-use overfly::core::datasource::PageKey;
+use overfly::core::datasource::{Page, PageKey};
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
 use overfly::jobs::now_ns;
 use overfly::loader::Loader;
+use overfly::replay::measure::PagePart;
+use overfly::sources::Sources;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most frames in which the terrain comes up before a flight.
@@ -39,6 +42,15 @@ pub struct Flown {
     delay: usize,
     coming: VecDeque<(usize, PageKey)>,
     count: usize,
+}
+
+/// A page, or as much of it as measuring needs; none where its data cannot be had.
+pub fn page_of(sources: &Sources, (key, part): (PageKey, PagePart)) -> Option<Arc<Page>> {
+    let page = match part {
+        PagePart::Heights => sources.bare_page(key),
+        PagePart::Whole => sources.page(key),
+    };
+    page.ok()
 }
 
 /// How a flight is flown.

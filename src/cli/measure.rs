@@ -11,7 +11,7 @@ mod json;
 mod table;
 mod tuned;
 
-use super::flown::{Flown, Manner};
+use super::flown::{Flown, Manner, page_of};
 use super::replay::{default_workers, parse_frames, parse_size};
 use super::source::recording_header;
 use super::{Failure, INTERRUPTED, place_of, write_whole};
@@ -219,7 +219,9 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
     let mut worst: Option<Worst> = None;
     let sources = flown.overfly.sources().clone();
     // A page takes long enough to be waited for after Ctrl-C.
-    let make = |key| if stop.load(Ordering::Relaxed) { None } else { sources.page(key).ok() };
+    let make = |key, part| {
+        if stop.load(Ordering::Relaxed) { None } else { page_of(&sources, (key, part)) }
+    };
     let style = "{bar:40} {pos}/{len} frames, {eta} left; E1 {msg}";
     let bar = ProgressBar::new(facts.frames.len() as u64)
         .with_style(ProgressStyle::with_template(style).expect("a fixed template"));

@@ -119,12 +119,41 @@ impl Generator {
         assert!(colour.as_ref().is_none_or(|colour| colour.key == key), "the cell's own colour");
         let needs = self.needs(key);
         assert_eq!(needs.len(), tiles.len(), "a tile, or none, for every need");
+        let mut page = self.blank(key, colour);
+        let mut plots = Plots::new(&self.bed, &needs, tiles);
+        self.fill_samples(&mut page, &mut plots);
+        self.fill_normals(&mut page, &mut plots);
+        page.content = content_of(&page);
+        Arc::from(page)
+    }
+
+    /// The same page with its samples alone, in a third of the time: heights, layers and survey to
+    /// the last bit, no bounds (they are infinite: nothing is known between samples), no normals
+    /// (all are those of the third axis). For who reads heights; never for a terrain.
+    ///
+    /// # Panics
+    /// If there are fewer or more tiles than [`Self::needs`] asked for.
+    pub fn bare_page_from(&self, key: PageKey, tiles: &[Option<Arc<Tile>>]) -> Arc<Page> {
+        let needs = self.needs(key);
+        assert_eq!(needs.len(), tiles.len(), "a tile, or none, for every need");
+        let mut page = self.blank(key, None);
+        page.bounds.fill(Bound::UNKNOWN);
+        let mut plots = Plots::new(&self.bed, &needs, tiles);
+        for (i, j) in places() {
+            let ground = plots.ground(key.sample(i, j));
+            put(&mut page, j * PAGE_SIDE + i, &ground);
+        }
+        page.content = content_of(&page);
+        Arc::from(page)
+    }
+
+    fn blank(&self, key: PageKey, colour: Option<Arc<ColourTile>>) -> Box<Page> {
         let survey = Survey {
             sea_level_m: [0.0; SAMPLES],
             sea_level_variation_m: 0.0,
             origin: [Origin::Procedural; SAMPLES],
         };
-        let mut page = Box::new(Page {
+        Box::new(Page {
             key,
             heights_m: [0.0; SAMPLES],
             normals: [[0; 2]; SAMPLES],
@@ -133,12 +162,7 @@ impl Generator {
             survey: (!self.bed.is_procedural()).then(|| Box::new(survey)),
             colour,
             content: 0,
-        });
-        let mut plots = Plots::new(&self.bed, &needs, tiles);
-        self.fill_samples(&mut page, &mut plots);
-        self.fill_normals(&mut page, &mut plots);
-        page.content = content_of(&page);
-        Arc::from(page)
+        })
     }
 
     /// Height of the ground itself above the ellipsoid at a lattice point of the page `key`, below
@@ -159,14 +183,7 @@ impl Generator {
         for (i, j) in places() {
             let point = page.key.sample(i, j);
             let ground = plots.ground(point);
-            let at = j * PAGE_SIDE + i;
-            page.heights_m[at] = narrow(ground.height_m);
-            let layers = ground.layers;
-            page.layers[at] = [layers.roughness, layers.rock, layers.moisture, layers.temperature];
-            if let Some(survey) = &mut page.survey {
-                survey.sea_level_m[at] = narrow(ground.sea_level_m);
-                survey.origin[at] = ground.origin;
-            }
+            put(page, j * PAGE_SIDE + i, &ground);
             if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
                 let place = j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE;
                 page.bounds[place] = self.bound(page, point, &ground, plots);
@@ -337,6 +354,17 @@ impl Generator {
 
 /// Rounding of bounds through f32, many times over.
 const ROUNDING: f64 = 1.0 + 1e-6;
+
+/// Writes one sample.
+fn put(page: &mut Page, at: usize, ground: &Ground) {
+    page.heights_m[at] = narrow(ground.height_m);
+    let layers = ground.layers;
+    page.layers[at] = [layers.roughness, layers.rock, layers.moisture, layers.temperature];
+    if let Some(survey) = &mut page.survey {
+        survey.sea_level_m[at] = narrow(ground.sea_level_m);
+        survey.origin[at] = ground.origin;
+    }
+}
 
 /// Column and row of every sample, row by row.
 fn places() -> impl Iterator<Item = (usize, usize)> {

@@ -32,6 +32,13 @@ pub struct Bound {
 }
 
 impl Bound {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        error_odd_m: f32::INFINITY,
+        error_even_m: f32::INFINITY,
+        variation_m: f32::INFINITY,
+    };
+
     fn max(self, other: Self) -> Self {
         let max = |a: f32, b: f32| if a > b { a } else { b };
         Self {

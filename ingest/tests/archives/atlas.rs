@@ -156,6 +156,12 @@ impl Atlas {
         let needs = self.generator.needs(key);
         let tiles: Vec<_> = needs.iter().map(|need| self.tile(need.archive, need.key)).collect();
         let page = self.generator.page_from(key, &tiles);
+        let bare = self.generator.bare_page_from(key, &tiles);
+        let last = page.heights_m.len() - 1;
+        for at in [0, last / 3, last / 2, last] {
+            let surface = |page: &Page| [page.surface_m(at, false), page.sea_level_m(at)];
+            assert_eq!(surface(&bare), surface(&page), "sample {at} of {key:?}");
+        }
         let mut pages = self.pages.borrow_mut();
         if pages.len() >= PAGES {
             pages.clear();

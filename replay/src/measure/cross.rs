@@ -14,6 +14,7 @@
 use super::cast::pyramid;
 use super::errors::Cross;
 use super::frame::Measure;
+use super::reference::PagePart;
 use super::thorough::{Shot, spread_of};
 use glam::{DVec2, DVec3};
 use overfly_core::datasource::key::{PAGE_BITS, PAGE_SIDE};
@@ -111,7 +112,7 @@ fn gather(measure: &Measure, shot: &Shot<'_>, part: (&[DVec3; 4], f64)) -> Groun
     let mut wave: Vec<PageKey> = (0..4).map(PageKey::root).collect();
     while !wave.is_empty() && ground.pages() < PAGES_MAX {
         let mut next = Vec::new();
-        for page in measure.pages(shot, &wave).into_iter().flatten() {
+        for page in measure.pages(shot, (&wave, PagePart::Whole)).into_iter().flatten() {
             if is_coarse(measure, shot, &page, part) {
                 next.extend((0..4).map(|child| page.key.child(child)));
             }

@@ -18,7 +18,7 @@ use super::mesh::{Foothold, MeshThen};
 use super::nearby::Nearby;
 use super::raster::Raster;
 use super::rays::Grid;
-use super::reference::{Hit, MakePage, Reference};
+use super::reference::{Hit, MakePage, PagePart, Reference};
 use super::screen::Screen;
 use super::share::share;
 use super::spread::{Gathered, Spread, Where};
@@ -238,17 +238,23 @@ impl Measure {
     }
 
     /// A page: the reference's own, if it has it.
-    pub(super) fn page(&self, shot: &thorough::Shot<'_>, key: PageKey) -> Option<Arc<Page>> {
-        self.reference.page(key).or_else(|| (shot.make)(key))
+    pub(super) fn page(
+        &self,
+        shot: &thorough::Shot<'_>,
+        (key, part): (PageKey, PagePart),
+    ) -> Option<Arc<Page>> {
+        self.reference.page(key, part).or_else(|| (shot.make)(key, part))
     }
 
     /// Pages, made on all threads where they must be; none after it was stopped.
     pub(super) fn pages(
         &self,
         shot: &thorough::Shot<'_>,
-        keys: &[PageKey],
+        (keys, part): (&[PageKey], PagePart),
     ) -> Vec<Option<Arc<Page>>> {
-        let make = |at: usize| if self.is_stopped() { None } else { self.page(shot, keys[at]) };
+        let make = |at: usize| {
+            if self.is_stopped() { None } else { self.page(shot, (keys[at], part)) }
+        };
         share(keys.len(), self.settings.threads, make)
     }
 

@@ -11,6 +11,7 @@
 
 use super::frame::Measure;
 use super::mesh::MeshThen;
+use super::reference::PagePart;
 use super::spread::{Spread, Where};
 use super::thorough::{Shot, spread_of};
 use super::wide::{Wide, Wide3};
@@ -57,7 +58,8 @@ const LEVEL_LEAST: u8 = 12;
 /// How far a query's answer is from the height computed anew.
 fn query_error_m(measure: &Measure, shot: &Shot<'_>, (normal, level): (DVec3, u8)) -> Option<f64> {
     let scene = shot.terrain.settings();
-    let page = measure.page(shot, Place::of(normal).triangle(level).0.page())?;
+    let key = Place::of(normal).triangle(level).0.page();
+    let page = measure.page(shot, (key, PagePart::Heights))?;
     answer_error_m((&scene.body, scene.sea), [&page, &page], normal, level)
 }
 
@@ -182,7 +184,7 @@ pub(super) fn mesh(measure: &Measure, shot: &Shot<'_>) -> [Spread; 4] {
         .map(|offsets| beside(&measure.body, up, &offsets));
     let below = |normals: &[DVec3]| {
         let keys: Vec<PageKey> = normals.iter().map(|&normal| truth.page(normal)).collect();
-        let pages = measure.pages(shot, &keys);
+        let pages = measure.pages(shot, (&keys, PagePart::Heights));
         let found = normals.iter().zip(pages).filter_map(|(&normal, page)| {
             let drawn = measure.now.find(normal, 40)?;
             let error_m = truth.height_m(shot, normal, page?)? - drawn.height_m;

@@ -45,5 +45,5 @@ pub mod wide;
 
 pub use errors::{FlightErrors, FrameErrors, Thorough};
 pub use frame::{Measure, MeasureSettings};
-pub use reference::MakePage;
+pub use reference::{MakePage, PagePart};
 pub use spread::{Gathered, Spread, Where};

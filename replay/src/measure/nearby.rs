@@ -80,8 +80,10 @@ impl<'a> Nearby<'a> {
         let body = reference.body();
         let roots = reference.roots().filter_map(|root| Some((root, reference.plate(root, make)?)));
         let roots: Vec<(&Node, &Plate)> = roots.collect();
-        let floor_m = roots.iter().map(|(_, plate)| plate.low_m - plate.error_max_m);
-        let floor_m = floor_m.fold(0.0, f64::min).max(-0.5 * body.b_m());
+        let floors_m = roots.iter().filter_map(|&(root, plate)| {
+            Some(plate.low_m - reference.finer((root, plate), make)?.error_max_m)
+        });
+        let floor_m = floors_m.fold(0.0, f64::min).max(-0.5 * body.b_m());
         let horizon = Horizon::new(body, [floor_m, 0.0]);
         let eye_up_m = body.geodetic_from_ecef(Ecef(screen.eye)).height_m;
         let mut nearby = Self {
@@ -109,11 +111,15 @@ impl<'a> Nearby<'a> {
             self.stand(plate);
             return;
         }
+        let Some(finer) = self.reference.finer((node, plate), self.make) else {
+            self.stand(plate);
+            return;
+        };
         let planes = self.planes.map(|plane| plate.axes * plane);
-        let high_m = plate.high_m + plate.error_max_m;
+        let high_m = plate.high_m + finer.error_max_m;
         let reach_m = self.reach_m.map_or(f64::INFINITY, |m| m + self.horizon.tangent_m(high_m));
         for (index, kid) in node.kids().iter().enumerate() {
-            let around = plate.quarter(index);
+            let around = finer.quarter(index);
             let is_seen = planes.iter().all(|plane| farthest(&around, *plane, eye) >= 0.0);
             // Whether it is there already makes no difference: results must not hang on that.
             if is_seen && around.distance(eye) <= reach_m {

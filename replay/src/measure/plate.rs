@@ -36,8 +36,6 @@ pub struct Plate {
     pub origin: DVec3,
     /// From body-fixed axes to the plate's: the third is the vertical of its middle.
     pub axes: DMat3,
-    /// How far the ground strays from the triangles at most, as the page has it; metres.
-    pub error_max_m: f64,
     /// Longest side of a cell, metres.
     pub cell_m: f64,
     /// Greatest height of the samples, metres.
@@ -51,6 +49,15 @@ pub struct Plate {
     places: Vec<DVec3>,
     quads: Vec<Quad>,
     skirt_m: f64,
+}
+
+/// What plates below another one may have.
+pub struct Finer {
+    /// The page, with its bounds.
+    pub page: Arc<Page>,
+    /// How far the ground strays from the triangles at most, as the page has it; metres.
+    pub error_max_m: f64,
+    quarters: [Box3; 4],
 }
 
 /// A square of a plate: one of 2^bits by 2^bits, counted quarter by quarter.
@@ -109,7 +116,6 @@ impl Plate {
             key,
             origin,
             axes,
-            error_max_m: 0.0,
             cell_m,
             high_m,
             low_m,
@@ -161,30 +167,13 @@ impl Plate {
             }
         }
         for (index, (x, y)) in KIDS.into_iter().enumerate() {
-            let error_m = self.error_m(index);
-            self.error_max_m = self.error_max_m.max(error_m);
-            self.quarters[index] = boxes[place(1, x, y)].grown(error_m);
+            self.quarters[index] = boxes[place(1, x, y)];
         }
-    }
-
-    /// How far the ground of a quarter strays from the triangles at most, as the page has it.
-    fn error_m(&self, quarter: usize) -> f64 {
-        let half = BOUND_SIDE / 2;
-        let (i0, j0) = (quarter % 2 * half, quarter / 2 * half);
-        let all = (j0..=j0 + half).flat_map(|j| (i0..=i0 + half).map(move |i| (i, j)));
-        let bounds = all.map(|(i, j)| &self.page.bounds[j * BOUND_SIDE + i]);
-        bounds.map(|bound| f64::from(bound.error_odd_m.max(bound.error_even_m))).fold(0.0, f64::max)
     }
 
     /// The box around everything, in the plate's axes.
     pub fn whole(&self) -> Box3 {
         self.whole
-    }
-
-    /// The box around all that finer plates of a quarter may have, in the plate's axes; counted as
-    /// pages count their children.
-    pub fn quarter(&self, index: usize) -> Box3 {
-        self.quarters[index]
     }
 
     /// A part of it.
@@ -310,6 +299,34 @@ impl Plate {
         };
         Some(Meeting { t, corners: [a, b, a], weights: [1.0 - along, along, 0.0] })
     }
+}
+
+impl Finer {
+    /// From a plate and its page, bounds and all.
+    pub fn new(page: Arc<Page>, plate: &Plate) -> Self {
+        let errors_m = [0, 1, 2, 3].map(|quarter| error_m(&page, quarter));
+        let grown = |quarter: usize| plate.quarters[quarter].grown(errors_m[quarter]);
+        Self {
+            error_max_m: errors_m.into_iter().fold(0.0, f64::max),
+            quarters: [0, 1, 2, 3].map(grown),
+            page,
+        }
+    }
+
+    /// The box around all that finer plates of a quarter may have, in the plate's axes; counted as
+    /// pages count their children.
+    pub fn quarter(&self, index: usize) -> Box3 {
+        self.quarters[index]
+    }
+}
+
+/// How far the ground of a quarter strays from the triangles at most, as the page has it.
+fn error_m(page: &Page, quarter: usize) -> f64 {
+    let half = BOUND_SIDE / 2;
+    let (i0, j0) = (quarter % 2 * half, quarter / 2 * half);
+    let all = (j0..=j0 + half).flat_map(|j| (i0..=i0 + half).map(move |i| (i, j)));
+    let bounds = all.map(|(i, j)| &page.bounds[j * BOUND_SIDE + i]);
+    bounds.map(|bound| f64::from(bound.error_odd_m.max(bound.error_even_m))).fold(0.0, f64::max)
 }
 
 /// The triangles of two by two cells all meet in the middle: diagonals join corners that are both

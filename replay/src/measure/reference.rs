@@ -8,11 +8,12 @@
 //! A plate is fine enough when its cells look no larger than a stated share of a pixel; in place of
 //! a coarser one stand its four children. Rays choose: a child is made when the first ray enters
 //! the box around all that it may have before it has met nearer ground. So what lies behind ridges
-//! is never made, and what a ray meets hangs on that ray and the eye alone, in whatever order and
-//! on whatever thread rays are cast. What the reference itself leaves out is stated, not hidden:
-//! what lies below its cells.
+//! is never made, and bounds, which take twice as long as heights, only for plates that have
+//! children. What a ray meets hangs on that ray and the eye alone, in whatever order and on
+//! whatever thread rays are cast. What the reference itself leaves out is stated, not hidden: what
+//! lies below its cells.
 
-use super::plate::{Meeting, Plate};
+use super::plate::{Finer, Meeting, Plate};
 use glam::DVec3;
 use overfly_core::datasource::{Page, PageKey};
 use overfly_core::geodesy::Ellipsoid;
@@ -21,7 +22,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 /// Makes pages: any thread may ask; `None` where it cannot be made.
-pub type MakePage<'a> = &'a (dyn Fn(PageKey) -> Option<Arc<Page>> + Sync);
+pub type MakePage<'a> = &'a (dyn Fn(PageKey, PagePart) -> Option<Arc<Page>> + Sync);
+
+/// What is wanted of a page. Heights are the same either way.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum PagePart {
+    /// Heights alone: bounds are infinite and normals are none, or all is there.
+    Heights,
+    /// All of it.
+    Whole,
+}
 
 /// Plates that were not needed for this many measured frames are dropped.
 const IDLE_FRAMES: u64 = 90;
@@ -47,6 +57,8 @@ pub(super) struct Node {
     used: AtomicU64,
     /// `None` where the page cannot be made.
     plate: OnceLock<Option<Box<Plate>>>,
+    /// What is known of finer plates, where the eye came so near that it was asked for.
+    finer: OnceLock<Option<Box<Finer>>>,
     kids: OnceLock<Box<[Node; 4]>>,
 }
 
@@ -65,7 +77,13 @@ pub struct Hit {
 
 impl Node {
     fn new(key: PageKey) -> Self {
-        Self { key, used: AtomicU64::new(0), plate: OnceLock::new(), kids: OnceLock::new() }
+        Self {
+            key,
+            used: AtomicU64::new(0),
+            plate: OnceLock::new(),
+            finer: OnceLock::new(),
+            kids: OnceLock::new(),
+        }
     }
 
     pub(super) fn kids(&self) -> &[Self; 4] {
@@ -76,6 +94,9 @@ impl Node {
     fn forget(&mut self, oldest: u64) {
         if self.plate.get().is_some_and(Option::is_none) {
             self.plate = OnceLock::new();
+        }
+        if self.finer.get().is_some_and(Option::is_none) {
+            self.finer = OnceLock::new();
         }
         let Some(kids) = self.kids.get_mut() else { return };
         if kids.iter().all(|kid| kid.used.load(Ordering::Relaxed) < oldest) {
@@ -113,26 +134,44 @@ impl Reference {
         self.roots.iter_mut().for_each(|root| root.forget(oldest));
     }
 
-    /// A page, if it was made for a plate that is still kept.
-    pub fn page(&self, key: PageKey) -> Option<Arc<Page>> {
+    /// A page, if as much of it was made for a plate that is still kept.
+    pub fn page(&self, key: PageKey, part: PagePart) -> Option<Arc<Page>> {
         let mut node = &self.roots[usize::from(key.quadrant())];
         for depth in (0..key.depth()).rev() {
             let bit = |of: u32| (of >> depth & 1) as usize;
             node = &node.kids.get()?[2 * bit(key.y()) + bit(key.x())];
         }
-        node.plate.get()?.as_ref().map(|plate| plate.page.clone())
+        let whole = || node.finer.get()?.as_ref().map(|finer| finer.page.clone());
+        let heights = || node.plate.get()?.as_ref().map(|plate| plate.page.clone());
+        whole().or_else(|| heights().filter(|_| part == PagePart::Heights))
     }
 
     /// The plate of a node, made now if it must be.
     pub(super) fn plate<'a>(&self, node: &'a Node, make: MakePage<'_>) -> Option<&'a Plate> {
         node.used.store(self.frame, Ordering::Relaxed);
         let plate = node.plate.get_or_init(|| {
-            let page = make(node.key);
+            let page = make(node.key, PagePart::Heights);
             let count = if page.is_some() { &self.made } else { &self.missing };
             count.fetch_add(1, Ordering::Relaxed);
             page.map(|page| Box::new(Plate::new(page, &self.body, self.sea)))
         });
         plate.as_deref()
+    }
+
+    /// What finer plates below that of a node may have, found out now if it must be.
+    pub(super) fn finer<'a>(
+        &self,
+        (node, plate): (&'a Node, &Plate),
+        make: MakePage<'_>,
+    ) -> Option<&'a Finer> {
+        let finer = node.finer.get_or_init(|| {
+            let page = make(node.key, PagePart::Whole);
+            if page.is_none() {
+                self.missing.fetch_add(1, Ordering::Relaxed);
+            }
+            page.map(|page| Box::new(Finer::new(page, plate)))
+        });
+        finer.as_deref()
     }
 
     pub(super) fn roots(&self) -> impl Iterator<Item = &Node> {

@@ -7,7 +7,7 @@
 
 use super::fly::Plan;
 use crate::cli::Failure;
-use crate::cli::flown::Flown;
+use crate::cli::flown::{Flown, page_of};
 use crate::cli::replay::default_workers;
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::replay::budget::RunRecord;
@@ -52,7 +52,8 @@ pub fn sample(
         flown.frame(first + frame)?;
         measure.cut();
         let now = (flown.overfly.terrain(), &flown.output);
-        measure.frame(now, frame as u64, &|key| sources.page(key).ok(), &mut errors);
+        let make = |key, part| page_of(&sources, (key, part));
+        measure.frame(now, frame as u64, &make, &mut errors);
         let found = errors.frames.last().expect("just measured");
         let values = [found.e1_px.max, found.e1_px.rms, found.bound_px, found.e5()];
         for (name, value) in ERRORS.into_iter().zip(values) {

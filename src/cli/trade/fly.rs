@@ -7,7 +7,7 @@
 
 use super::plan::Plan;
 use crate::cli::Failure;
-use crate::cli::flown::Flown;
+use crate::cli::flown::{Flown, page_of};
 use crate::cli::replay::default_workers;
 use overfly::core::frame::{FrameCounts, STAGES};
 use overfly::jobs::{Span, Spans};
@@ -62,6 +62,7 @@ pub fn measure_clip(
     let mut counts = names.map(|name| (name.to_owned(), Vec::with_capacity(clip.len())));
     let (mut digest, mut flight) = (RunDigest::default(), FlightErrors::default());
     let sources = flown.overfly.sources().clone();
+    let make = |key, part| page_of(&sources, (key, part));
     for index in clip.clone() {
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
@@ -73,7 +74,7 @@ pub fn measure_clip(
         }
         let frame = (flown.overfly.terrain(), &flown.output);
         if index + 1 == clip.end {
-            measure.frame(frame, index as u64, &|key| sources.page(key).ok(), &mut flight);
+            measure.frame(frame, index as u64, &make, &mut flight);
         } else if index + 2 == clip.end {
             measure.take(frame.0, frame.1);
         }
