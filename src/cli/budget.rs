@@ -13,6 +13,7 @@ mod junit;
 mod markdown;
 mod options;
 mod reports;
+mod stills;
 mod trace;
 mod versus;
 
@@ -34,6 +35,7 @@ use reports::{Report, word};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use stills::Still;
 use versus::{Side, Versus, versus};
 
 /// A line does not hold, or the other program is slower.
@@ -42,6 +44,8 @@ const FAILED: u8 = 1;
 const INCONCLUSIVE: u8 = 3;
 /// Runs where times are judged: one alone does not tell a slow program from a busy machine.
 const RUNS: u32 = 3;
+/// Stills of a page at most.
+const STILLS: usize = 6;
 /// So many annotations of one kind are what GitHub shows.
 const ANNOTATIONS: usize = 10;
 
@@ -76,6 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let all = [Some(outcome(&verdicts)), against.as_ref().map(Versus::outcome)];
     let all = if stopped { Outcome::Inconclusive } else { together(all) };
+    let (stills, why) = stills(arguments, &plan, flew.as_ref(), &stop)?;
+    notes.extend(why);
     let report = Report {
         flight: &arguments.flight,
         outcome: all,
@@ -83,6 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         verdicts: &verdicts,
         flew: flew.as_ref(),
         versus: against.as_ref(),
+        stills: &stills,
         limits_ms: &limits_ms(&given.budget),
     };
     shown(&report);
@@ -226,6 +233,26 @@ fn judged(
         }
     }
     Ok(judge(record, &given.budget, given.baseline.as_ref()))
+}
+
+/// Stills of the worst frames, for the page; or why there are none.
+fn stills(
+    arguments: &Arguments,
+    plan: &Plan,
+    flew: Option<&Flew>,
+    stop: &AtomicBool,
+) -> Result<(Vec<Still>, Option<String>), Failure> {
+    let is_wanted = arguments.out.is_some() && !arguments.no_stills;
+    let Some(flew) = flew.filter(|flew| is_wanted && flew.record.frames() > 0) else {
+        return Ok((Vec::new(), None));
+    };
+    let mut worst = html::worst(&flew.record);
+    worst.truncate(STILLS);
+    let first = flew.record.facts.first_frame as usize;
+    Ok(match stills::draw(plan, (first, &worst), stop)? {
+        Ok(stills) => (stills, None),
+        Err(why) => (Vec::new(), Some(why)),
+    })
 }
 
 /// Pairs of runs, where they were asked for.

@@ -1,4 +1,4 @@
-//! A flight flown frame by frame for those who look at each frame: no pictures, no recording.
+//! A flight flown frame by frame for those who look at each frame: no recording.
 //!
 //! In:    a flight or recording, a scene, workers, a delay of the loader.
 //! Out:   the terrain after each frame, and the frame's output.
@@ -111,6 +111,14 @@ impl Flown {
     /// Runs one frame.
     pub fn frame(&mut self, index: usize) -> Result<(), Failure> {
         self.run(index + self.source.lead_in(), false)
+    }
+
+    /// Runs one frame and draws its first view: RGBA rows, top first. There must be a renderer.
+    pub fn frame_drawn(&mut self, index: usize) -> Result<Vec<u8>, Failure> {
+        self.frame(index)?;
+        self.overfly.draw(&self.output, 0)?;
+        let pixels = self.overfly.with_renderer(|renderer| renderer.read_pixels());
+        Ok(pixels.transpose()?.ok_or("there is no renderer")?)
     }
 
     /// Time of the last frame's input in seconds.

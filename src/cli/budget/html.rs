@@ -8,7 +8,9 @@
 
 use super::chart::{Along, band, events, histogram, map, profile, stack};
 use super::reports::{Report, word};
+use super::stills::Still;
 use crate::cli::trade::plot::escaped;
+use base64::prelude::{BASE64_STANDARD, Engine};
 use overfly::replay::budget::change::number;
 use overfly::replay::budget::record::{FRAME, times};
 use overfly::replay::budget::{RunRecord, Status, Verdict};
@@ -34,7 +36,10 @@ th,td{padding:.25em .6em;border-bottom:1px solid #d8dee4;text-align:right;vertic
 th.l,td.l{text-align:left}td.w{text-align:left;white-space:nowrap}.FAIL{color:#d1242f;font-weight:600}.inconclusive{color:#9a6700;\
 font-weight:600}.warn{color:#9a6700}.pass{color:#1a7f37}.skipped{color:#57606a}\
 .key span{margin-right:1em}.key i{display:inline-block;width:.8em;height:.8em;margin-right:.3em}\
-code{background:#f6f8fa;padding:.1em .3em}";
+\
+.stills{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:.8em;\
+margin-top:1em}figure{margin:0}figure img{width:100%;display:block}\
+figcaption{font-size:12px;color:#57606a}code{background:#f6f8fa;padding:.1em .3em}";
 
 /// The page.
 pub fn page(report: &Report) -> String {
@@ -56,7 +61,7 @@ pub fn page(report: &Report) -> String {
     }
     verdicts(&mut out, report.verdicts);
     if let Some(flew) = report.flew.filter(|flew| flew.record.frames() > 0) {
-        charts(&mut out, &flew.record, report.limits_ms);
+        charts(&mut out, report, &flew.record);
         facts(&mut out, &flew.record);
     }
     out.push_str("</body></html>\n");
@@ -113,7 +118,7 @@ fn table(out: &mut String, verdicts: &[&Verdict]) {
     put(out, format_args!("</table></div>\n"));
 }
 
-fn charts(out: &mut String, record: &RunRecord, limits_ms: &[f64]) {
+fn charts(out: &mut String, report: &Report, record: &RunRecord) {
     let along = Along {
         frames: record.frames(),
         first_s: record.time_s.first().copied().unwrap_or(0.0),
@@ -127,7 +132,7 @@ fn charts(out: &mut String, record: &RunRecord, limits_ms: &[f64]) {
     let triangles = column(record, "triangles");
     if !frame_ms.is_empty() {
         let title = "frame times, milliseconds: the slowest run of each frame, least to most";
-        out.push_str(&band(title, along, &frame_ms, limits_ms));
+        out.push_str(&band(title, along, &frame_ms, report.limits_ms));
     }
     if let Some(heights) = record.ground.columns.get("height_m") {
         let frames = record.ground.frames.iter().copied();
@@ -157,6 +162,7 @@ fn charts(out: &mut String, record: &RunRecord, limits_ms: &[f64]) {
         out.push_str(&histogram(&frame_ms));
     }
     worst_table(out, record, (&worst, by), &stages);
+    stills(out, record, report.stills);
     put(out, format_args!("<h2>Map</h2>\n"));
     let label = |frame: usize| (frame, record.place(frame));
     let marked: Vec<_> = worst.iter().map(|&frame| label(frame)).collect();
@@ -172,6 +178,12 @@ fn worst_of_runs(record: &RunRecord) -> Vec<f64> {
     let runs = record.times_ms(FRAME);
     let of = |frame: usize| runs.iter().map(|run| run[frame]).fold(0.0, f64::max);
     (0..runs.first().map_or(0, Vec::len)).map(of).collect()
+}
+
+/// The worst frames of a run: the slowest, or where nothing was timed those of most triangles.
+pub fn worst(record: &RunRecord) -> Vec<usize> {
+    let frame_ms = worst_of_runs(record);
+    worst_frames(if frame_ms.is_empty() { column(record, "triangles") } else { &frame_ms })
 }
 
 /// The largest frames, but for neighbours of larger ones.
@@ -225,6 +237,26 @@ fn worst_table(
         put(out, format_args!("</tr>\n"));
     }
     put(out, format_args!("</table></div>\n"));
+}
+
+/// Pictures within the page.
+fn stills(out: &mut String, record: &RunRecord, stills: &[Still]) {
+    if stills.is_empty() {
+        return;
+    }
+    put(out, format_args!("<div class=\"stills\">\n"));
+    for still in stills {
+        let place = escaped(&record.place(still.frame));
+        put(
+            out,
+            format_args!(
+                "<figure><img alt=\"{place}\" src=\"data:image/jpeg;base64,{}\">\
+                 <figcaption>{place}</figcaption></figure>\n",
+                BASE64_STANDARD.encode(&still.jpeg)
+            ),
+        );
+    }
+    put(out, format_args!("</div>\n"));
 }
 
 fn facts(out: &mut String, record: &RunRecord) {

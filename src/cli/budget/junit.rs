@@ -5,8 +5,10 @@
 //! Keeps: nothing.
 //! Not here: what a verdict is (`overfly::replay::budget`).
 //!
-//! What nobody knows is `skipped` with its reason: JUnit has no third answer. Warnings pass, and
-//! say what they have to say in `system-out`.
+//! What nobody knows is `skipped` with its reason: JUnit has no third answer. Warnings pass; what
+//! they and all other lines have to say stands in the suite's `system-out`. There are two schemas,
+//! Jenkins' and that of Ant's reports: the file is valid by both, so the root has no attributes,
+//! the suite has all, and a case holds what went wrong or nothing.
 
 use super::reports::Report;
 use overfly::replay::budget::{Relation, Status};
@@ -51,11 +53,13 @@ pub fn text(report: &Report) -> String {
         (count(Status::Fail), count(Status::Skipped) + count(Status::Inconclusive));
     let (all, name) = (cases.len(), escaped(&format!("overfly budget {}", report.flight)));
     let mut out = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <testsuites name=\"overfly\" tests=\"{all}\" failures=\"{failed}\" errors=\"0\" \
-         time=\"0\">\n<testsuite name=\"{name}\" tests=\"{all}\" failures=\"{failed}\" \
-         errors=\"0\" skipped=\"{skipped}\" time=\"0\">\n"
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n\
+         <testsuite id=\"0\" package=\"overfly\" name=\"{name}\" timestamp=\"{}\" \
+         hostname=\"localhost\" tests=\"{all}\" failures=\"{failed}\" errors=\"0\" \
+         skipped=\"{skipped}\" time=\"0\">\n<properties/>\n",
+        timestamp()
     );
+    let mut said = String::new();
     for Case { class, name, status, sentence } in &cases {
         let (name, sentence) = (escaped(name), escaped(sentence));
         let inside = match status {
@@ -64,17 +68,24 @@ pub fn text(report: &Report) -> String {
             }
             Status::Inconclusive => format!("<skipped message=\"inconclusive: {sentence}\"/>"),
             Status::Skipped => format!("<skipped message=\"{sentence}\"/>"),
-            Status::Warn => format!("<system-out>warning: {sentence}</system-out>"),
-            Status::Pass => format!("<system-out>{sentence}</system-out>"),
+            Status::Warn | Status::Pass => String::new(),
         };
+        writeln!(said, "{}: {sentence}", status.word()).expect("a text grows");
         writeln!(
             out,
             "<testcase classname=\"{class}\" name=\"{name}\" time=\"0\">{inside}</testcase>"
         )
         .expect("a text grows");
     }
-    out.push_str("</testsuite>\n</testsuites>\n");
+    write!(out, "<system-out>{said}</system-out>\n<system-err/>\n</testsuite>\n</testsuites>\n")
+        .expect("a text grows");
     out
+}
+
+/// Now, to the second, in UTC; the schemas want no zone.
+fn timestamp() -> String {
+    let now = humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string();
+    now.trim_end_matches('Z').to_owned()
 }
 
 /// Text as XML 1.0 takes it in attributes and elements; characters that it cannot have at all, as

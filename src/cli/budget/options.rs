@@ -76,6 +76,9 @@ pub struct Arguments {
     /// Folder for run.json, junit.xml, summary.md, frames.csv, trace.json and report.html.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Draws no stills of the worst frames for the page.
+    #[arg(long)]
+    pub no_stills: bool,
     /// Writes the run alone: every frame's counts, digests, places and times. A baseline.
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,

@@ -6,6 +6,7 @@
 //! Not here: what is in them (`junit`, `markdown`, `trace`, `html`).
 
 use super::fly::Flew;
+use super::stills::Still;
 use super::versus::Versus;
 use super::{html, junit, markdown, trace};
 use crate::cli::{Failure, write_whole};
@@ -23,6 +24,8 @@ pub struct Report<'a> {
     pub verdicts: &'a [Verdict],
     pub flew: Option<&'a Flew>,
     pub versus: Option<&'a Versus>,
+    /// Of the worst frames.
+    pub stills: &'a [Still],
     /// Limits of single frames, for the chart of frame times.
     pub limits_ms: &'a [f64],
 }
