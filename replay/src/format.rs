@@ -23,6 +23,10 @@
 //! | 1 | flights, which are still written so; recordings without flags |
 //! | 2 | recordings with a byte of flags at the end of each frame |
 //!
+//! There is no index: every [`KEY_EVERY`]-th frame refers to none before it, a block is known by its
+//! checks wherever a reader lands, and a frame's block begins with its index. So any frame is found by
+//! halving the file, without an end block as well, and behind damage.
+//!
 //! The check byte makes a damaged length look damaged: without it a length that points past the
 //! end would be taken for a file that was cut off.
 

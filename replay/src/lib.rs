@@ -36,6 +36,6 @@ pub use compare::{RunDigest, first_difference};
 pub use flight::{BUNDLED, Flight, bundled, flight};
 pub use format::{Difference, Header, Kind, RecordedFrame};
 pub use pose::{Pose, view_of};
-pub use read::{Ending, Fault, Frame, ReadError, Reader, Recording};
-pub use stats::Summary;
+pub use read::{Ending, Fault, Frame, ReadError, Reader, Recording, Tail};
+pub use stats::{Summary, Tally};
 pub use write::{WriteError, Writer};

@@ -130,7 +130,8 @@ impl Writer {
     /// Begins a file and writes its header.
     ///
     /// # Errors
-    /// Where the file system refuses, or the header has no usable rate or is too long.
+    /// Where the file system refuses, or the header has no usable rate or is too long; then there
+    /// is no new file.
     pub fn create(path: &Path, header: &Header) -> Result<Self, WriteError> {
         if !rate_is_usable(header.rate_hz) {
             return Err(WriteError::Rate { file: path.into(), found_hz: header.rate_hz });
@@ -149,7 +150,11 @@ impl Writer {
         };
         writer.block.extend_from_slice(&MAGIC);
         writer.block.extend_from_slice(&header.kind.version().to_le_bytes());
-        writer.write_block(HEADER_MARK)?;
+        if let Err(error) = writer.write_block(HEADER_MARK) {
+            // A file without a header is of no use, and in the way of the next one.
+            let _ = fs::remove_file(&writer.written);
+            return Err(error);
+        }
         Ok(writer)
     }
 

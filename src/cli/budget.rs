@@ -21,7 +21,7 @@ use super::flown::Manner;
 use super::replay::default_workers;
 use super::source::recording_header;
 use super::trade::stop_on_ctrl_c;
-use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, write_whole};
+use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, read_by, write_whole};
 use fly::{Flew, Plan};
 pub use options::Arguments;
 use overfly::config::{self, read_budget};
@@ -129,11 +129,9 @@ fn given(arguments: &Arguments) -> Result<Given, Failure> {
         .into());
     }
     let baseline = arguments.baseline.as_deref().map(read_record).transpose()?;
-    let inputs = [Some(Path::new(&arguments.flight)), arguments.scene.as_deref().map(Path::new)];
+    let mut taken = read_by([Some(&arguments.flight), arguments.scene.as_ref()]);
     let files = [arguments.baseline.as_deref(), arguments.budget.as_deref()];
-    let inputs = inputs.into_iter().chain(files).flatten();
-    let mut taken: Vec<PathBuf> =
-        inputs.filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    taken.extend(files.into_iter().flatten().filter_map(|path| path.canonicalize().ok()));
     let record = arguments.record.as_deref().map(|path| place_of(path, &mut taken)).transpose()?;
     if let Some(folder) = arguments.out.as_ref().filter(|path| path.exists() && !path.is_dir()) {
         return Err(format!("--out {}: is there and is not a folder", folder.display()).into());

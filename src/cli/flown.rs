@@ -91,17 +91,17 @@ impl Flown {
     /// Holds the clock before frame `first` until the terrain has come up. False if it was stopped.
     pub fn lead_in(&mut self, first: usize, stop: &AtomicBool) -> Result<bool, Failure> {
         let recorded = self.source.lead_in();
-        let is_recording = matches!(self.source, Source::Recording(_));
+        let is_followed = self.source.is_followed();
         self.lead_in_ns.clear();
-        for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
+        for index in 0..if is_followed { recorded } else { LEAD_IN_MAX } {
             if stop.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            self.run(if is_recording { index } else { first }, !is_recording)?;
+            self.run(if is_followed { index } else { first + recorded }, !is_followed)?;
             self.lead_in_ns.push(self.frame_ns);
             let c = &self.output.counts;
             let idle = c.splits + c.merges + c.wanted == 0;
-            if !is_recording && c.leaves > 0 && idle && self.coming.is_empty() {
+            if !is_followed && c.leaves > 0 && idle && self.coming.is_empty() {
                 break;
             }
         }
@@ -132,11 +132,15 @@ impl Flown {
     }
 
     fn run(&mut self, played: usize, held: bool) -> Result<(), Failure> {
-        self.source.fill(played, &self.scene, self.size_px, &mut self.input);
+        if !self.source.load(played) {
+            return Err(self.source.fault());
+        }
+        self.source.fill(&self.scene, self.size_px, &mut self.input);
         if held {
             self.input.time_s -= 1.0 / self.source.rate_hz();
+            self.input.hold_lod = false;
         }
-        let arriving = self.arriving(played);
+        let arriving = self.arriving();
         self.loader.fetch(&arriving, &mut self.input.arrived);
         let begin_ns = now_ns();
         self.overfly.frame(&mut self.input, &mut self.output)?;
@@ -145,8 +149,8 @@ impl Flown {
     }
 
     /// The pages of this frame: as recorded; else what was wanted and is due.
-    fn arriving(&mut self, played: usize) -> Vec<PageKey> {
-        if let Some(keys) = self.source.arrived(played) {
+    fn arriving(&mut self) -> Vec<PageKey> {
+        if let Some(keys) = self.source.arrived() {
             return keys.to_vec();
         }
         for &key in &self.output.wanted {

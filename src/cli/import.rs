@@ -13,7 +13,7 @@ use overfly::config;
 use overfly::core::geodesy::Geodetic;
 use overfly::core::ground::{Answer, Query};
 use overfly::ingest::geoid::Geoid;
-use overfly::replay::{Flight, Header, Writer};
+use overfly::replay::{Header, Writer};
 use overfly::sources::Sources;
 use overfly::surveyor::Surveyor;
 use overfly_tracks::{Altitude, ColumnMap, Curve, Datum, Import, Options};
@@ -30,7 +30,7 @@ const RATE_HZ: f64 = 60.0;
 const SHOWN: usize = 10;
 /// From so many poses on there is a progress bar.
 const MANY: u64 = 50_000;
-/// Most poses of a flight that is flown without being imported: 48 hours, 600 MB.
+/// Most poses of a flight that is flown without being imported: 48 hours.
 const POSES_MAX: u64 = 48 * 3600 * 60;
 /// How often the ground is looked at for `--lift`, and over how long a lift is spread; seconds.
 const LIFT_S: [f64; 2] = [0.25, 4.0];
@@ -197,9 +197,7 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 
 /// The column map that was asked for, else the one beside the file.
 fn columns(file: &Path, asked: Option<&Path>) -> Result<Option<ColumnMap>, Failure> {
-    let mut beside = file.as_os_str().to_owned();
-    beside.push(".columns.ron");
-    let beside = PathBuf::from(beside);
+    let beside = columns_of(file);
     let Some(path) = asked.or_else(|| beside.is_file().then_some(beside.as_path())) else {
         return Ok(None);
     };
@@ -373,6 +371,13 @@ impl Floor {
     }
 }
 
+/// The file in which the columns of a table may be described.
+pub fn columns_of(file: &Path) -> PathBuf {
+    let mut beside = file.as_os_str().to_owned();
+    beside.push(".columns.ron");
+    beside.into()
+}
+
 /// The file that a name means, and the number of a flight in it, from 1: `flight.igc#2`.
 pub fn split(name: &str) -> (&Path, Option<usize>) {
     let whole = Path::new(name);
@@ -383,11 +388,21 @@ pub fn split(name: &str) -> (&Path, Option<usize>) {
     }
 }
 
+/// A flight of another program's file.
+pub struct Foreign {
+    /// The file's name, and the flight's number where there are several.
+    pub name: String,
+    /// Poses a second.
+    pub rate_hz: f64,
+    /// Where the aircraft is at any time.
+    pub curve: Curve,
+}
+
 /// A flight of a file, for commands that fly it: the one with that number, else the longest.
-pub fn flight(name: &str) -> Result<Flight, Failure> {
+pub fn flight(name: &str) -> Result<Foreign, Failure> {
     let (file, number) = split(name);
     let columns = columns(file, None)?;
-    let import = open(file, &Options { columns, ..Options::default() }).map_err(|error| {
+    let mut import = open(file, &Options { columns, ..Options::default() }).map_err(|error| {
         format!("{error}; `overfly import --help` says what can be read, and how")
     })?;
     let count = import.flights.len();
@@ -401,7 +416,7 @@ pub fn flight(name: &str) -> Result<Flight, Failure> {
             );
         }
     };
-    let curve = &import.flights[index];
+    let curve = import.flights.swap_remove(index);
     let poses = curve.count(RATE_HZ);
     if poses > POSES_MAX {
         let hours = curve.duration_s() / 3600.0;
@@ -422,5 +437,5 @@ pub fn flight(name: &str) -> Result<Flight, Failure> {
     }
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let name = if count > 1 { format!("{stem}-{}", index + 1) } else { stem.into_owned() };
-    Ok(Flight { name, rate_hz: RATE_HZ, poses: curve.poses(RATE_HZ).collect(), raised_m: 0.0 })
+    Ok(Foreign { name, rate_hz: RATE_HZ, curve })
 }

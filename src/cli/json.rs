@@ -5,7 +5,7 @@
 //! Keeps: nothing.
 //! Not here: writing the file.
 
-use super::columns::Columns;
+use super::columns::{Column, Columns};
 use serde_json::{Map, Value, json};
 
 /// Facts of a run beside its columns.
@@ -28,8 +28,8 @@ pub struct Facts<'a> {
 
 /// The object as text. 64-bit digests are strings of 16 hexadecimal digits.
 pub fn text(facts: &Facts<'_>, columns: &Columns) -> String {
-    let table = |columns: &[(&'static str, Vec<f64>)]| -> Map<String, Value> {
-        columns.iter().map(|(name, column)| ((*name).to_owned(), json!(column))).collect()
+    let table = |columns: &[Column]| -> Map<String, Value> {
+        columns.iter().map(|column| (column.name.to_owned(), json!(column.values()))).collect()
     };
     let object = json!({
         "format": "overfly-replay-1",
@@ -42,7 +42,7 @@ pub fn text(facts: &Facts<'_>, columns: &Columns) -> String {
         "digest": format!("{:016x}", facts.digest),
         "diverged": facts.diverged.map(|(frame, stage)| json!({"frame": frame, "stage": stage})),
         "stages_ms": table(&columns.stages_ms),
-        "waited_ms": columns.waited_ms,
+        "waited_ms": columns.waited_ms.values(),
         "counts": table(&columns.counts),
     });
     object.to_string()

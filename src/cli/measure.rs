@@ -14,12 +14,11 @@ mod tuned;
 use super::flown::{Flown, Manner, page_of};
 use super::replay::{default_workers, parse_frames, parse_size};
 use super::source::recording_header;
-use super::{Failure, INTERRUPTED, place_of, write_whole};
+use super::{Failure, INTERRUPTED, place_of, read_by, write_whole};
 use charts::Worst;
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::config;
 use overfly::core::settings::SceneSettings;
-use overfly::replay::Ending;
 use overfly::replay::measure::{FlightErrors, Measure, MeasureSettings};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -60,7 +59,7 @@ pub struct Arguments {
     /// A scene file or a preset (earth, moon, small). A recording brings its own. [default: earth]
     #[arg(long)]
     scene: Option<String>,
-    /// Only these frames, the end excluded.
+    /// Only these frames, the end excluded. The terrain comes up at A.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<usize>>,
     /// Measures every N-th frame; the others are only flown. [default: so that no more than 600
@@ -187,15 +186,13 @@ fn scene_of(arguments: &Arguments) -> Result<(String, SceneSettings), Failure> {
 
 /// Where the JSON goes, checked before anything runs.
 fn places(arguments: &Arguments) -> Result<Option<PathBuf>, Failure> {
-    let inputs = [Some(&arguments.flight), arguments.scene.as_ref()];
-    let mut taken: Vec<PathBuf> =
-        inputs.into_iter().flatten().filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    let mut taken = read_by([Some(&arguments.flight), arguments.scene.as_ref()]);
     arguments.json.as_deref().map(|path| place_of(path, &mut taken)).transpose()
 }
 
 fn frames_of(arguments: &Arguments, flown: &Flown) -> Result<Range<usize>, Failure> {
     let all = flown.source.frames();
-    if !matches!(flown.source.ending(), Ending::Complete) {
+    if !flown.source.is_whole() {
         eprintln!("overfly: {}: the file has no end; its whole frames count", arguments.flight);
     }
     let frames = arguments.frames.clone().unwrap_or(0..all);
@@ -225,6 +222,9 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
     let style = "{bar:40} {pos}/{len} frames, {eta} left; E1 {msg}";
     let bar = ProgressBar::new(facts.frames.len() as u64)
         .with_style(ProgressStyle::with_template(style).expect("a fixed template"));
+    if facts.frames.start > 0 {
+        flown.source.forget_states();
+    }
     let came_up = flown.lead_in(facts.frames.start, &stop)?;
     for index in facts.frames.clone() {
         if !came_up || stop.load(Ordering::Relaxed) {

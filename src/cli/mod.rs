@@ -80,11 +80,27 @@ pub fn place_of(path: &Path, taken: &mut Vec<PathBuf>) -> Result<PathBuf, Failur
             folder.canonicalize().map_err(failed)?.join(name)
         }
     };
-    if taken.contains(&place) {
+    // Also what is read may be called so: what a killed run left is a file like any other.
+    if taken.contains(&place) || taken.contains(&beside(&place)) {
         return refused("is an input or another output of this run already");
     }
     taken.push(place.clone());
     Ok(place)
+}
+
+/// The files that a run reads by these names, for [`place_of`]: of `flight.igc#2` the file, and what
+/// describes its columns.
+pub fn read_by<'a>(names: impl IntoIterator<Item = Option<&'a String>>) -> Vec<PathBuf> {
+    let files = names.into_iter().flatten().map(|name| import::split(name).0);
+    let files = files.flat_map(|file| [file.to_owned(), import::columns_of(file)]);
+    files.filter_map(|file| file.canonicalize().ok()).collect()
+}
+
+/// Where a file is written while it is not whole.
+pub fn beside(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    beside.into()
 }
 
 /// Writes a file beside its place and renames it there, so that a kill leaves the old one or none.
@@ -93,8 +109,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
+    let beside = beside(path);
     let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path));
     if written.is_err() {
         // What is half written helps nobody; that it cannot be removed changes nothing.

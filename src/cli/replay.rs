@@ -10,7 +10,9 @@ use super::run::{Run, fly};
 use super::source::{Source, recording_header};
 use super::still::parse_show;
 use super::stills::{Stills, chosen};
-use super::{BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, place_of, report, write_whole};
+use super::{
+    BAD_INPUT, DIVERGED, Failure, INTERRUPTED, json, place_of, read_by, report, write_whole,
+};
 use overfly::core::settings::SceneSettings;
 use overfly::render_vk::{Renderer, RendererSettings, Show};
 use overfly::replay::{Ending, Header, RunDigest, Writer};
@@ -31,10 +33,14 @@ pub struct Arguments {
     /// Worker threads beside the main one, 0 to 64. The results are the same for any number.
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=64))]
     workers: Option<u8>,
-    /// Only these frames, the end excluded. A flight comes up at A; a recording runs from its
-    /// beginning and reports these.
+    /// Only these frames, the end excluded. The terrain comes up at A, wherever in the file that is;
+    /// frames of a recording are then not held against what was recorded, unless A is 0.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<usize>>,
+    /// Runs a recording from its beginning and reports only --frames, so that they are the very
+    /// frames that were recorded, and are held against them.
+    #[arg(long, requires = "frames")]
+    from_start: bool,
     /// Size of the pictures; with a flight the level of detail follows it. [default: 1280x720]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
@@ -104,10 +110,8 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         run.reported.end,
         run.source.rate_hz(),
     );
-    if let Source::Flight(flight, _) = &run.source
-        && flight.raised_m > 0.0
-    {
-        say!("raised by {:.0} m to stay clear of this scene's ground", flight.raised_m);
+    if run.source.raised_m() > 0.0 {
+        say!("raised by {:.0} m to stay clear of this scene's ground", run.source.raised_m());
     }
     let finished = fly(&mut run, &mut overfly);
     // Whatever the loader still waits for, nobody needs it any more.
@@ -149,7 +153,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if arguments.validate {
         say!("validation messages: {}", messages.len());
     }
-    let code = verdict(&run.source, run.diverged, finished);
+    let code = verdict((&run.source, &run.reported), run.diverged, finished);
     Ok(if messages.is_empty() { code } else { ExitCode::from(DIVERGED) })
 }
 
@@ -162,13 +166,17 @@ fn named(error: OpenError, is_recording: bool, arguments: &Arguments) -> Failure
     error.into()
 }
 
-fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: bool) -> ExitCode {
+fn verdict(
+    (source, reported): (&Source, &Range<usize>),
+    diverged: Option<(usize, &'static str)>,
+    finished: bool,
+) -> ExitCode {
     match source.ending() {
-        Ending::Complete => {}
-        Ending::Unfinished => {
+        None | Some(Ending::Complete) => {}
+        Some(Ending::Unfinished) => {
             say!("the file has no end mark: its writer was stopped after its last frame");
         }
-        Ending::Damaged(error) => {
+        Some(Ending::Damaged(error)) => {
             let lead_in = source.lead_in();
             eprintln!(
                 "overfly: {error} ({lead_in} of them lead-in); the frames before it were played"
@@ -179,15 +187,19 @@ fn verdict(source: &Source, diverged: Option<(usize, &'static str)>, finished: b
         eprintln!("overfly: diverged from the recording in frame {frame}, stage {stage}");
         return ExitCode::from(DIVERGED);
     }
-    if matches!(source.ending(), Ending::Damaged(_)) {
+    if matches!(source.ending(), Some(Ending::Damaged(_))) {
         return ExitCode::from(BAD_INPUT);
     }
     if !finished {
         eprintln!("overfly: interrupted; everything up to here was kept");
         return ExitCode::from(INTERRUPTED);
     }
-    if matches!(source, Source::Recording(_)) {
+    if source.is_followed() {
         say!("same as recorded");
+    } else if source.is_recording() {
+        let first = reported.start;
+        say!("the terrain came up at frame {first}: not held against what was recorded");
+        say!("(--from-start runs the recording from its beginning and does that)");
     }
     ExitCode::SUCCESS
 }
@@ -221,9 +233,7 @@ struct Places {
 
 /// Checks every output before anything runs; none may be an input or another output.
 fn places(arguments: &Arguments) -> Result<Places, Failure> {
-    let inputs = [Some(&arguments.flight), arguments.scene.as_ref()];
-    let mut taken: Vec<PathBuf> =
-        inputs.into_iter().flatten().filter_map(|path| std::fs::canonicalize(path).ok()).collect();
+    let mut taken = read_by([Some(&arguments.flight), arguments.scene.as_ref()]);
     let mut place = |path: &Option<PathBuf>| -> Result<Option<PathBuf>, Failure> {
         path.as_deref().map(|path| place_of(path, &mut taken)).transpose()
     };
@@ -243,11 +253,11 @@ fn prepare(
     scene: SceneSettings,
     overfly: &mut Overfly,
 ) -> Result<Run, Failure> {
-    let source = Source::open(&arguments.flight, &scene, overfly)?;
+    let mut source = Source::open(&arguments.flight, &scene, overfly)?;
     let count = source.frames();
     let reported = arguments.frames.clone().unwrap_or(0..count);
     if count == 0 {
-        verdict(&source, None, true);
+        verdict((&source, &reported), None, true);
         let lead_in = source.lead_in();
         return Err(format!(
             "{} holds no frame beyond {lead_in} in which the terrain came up",
@@ -260,12 +270,19 @@ fn prepare(
         let asked = format!("{}..{}", reported.start, reported.end);
         return Err(format!("--frames {asked}: {name} has {count} frames, 0..{count}").into());
     }
-    let is_recording = matches!(source, Source::Recording(_));
+    let is_recording = source.is_recording();
+    if arguments.from_start && !is_recording {
+        return Err("--from-start: a flight has no states to be held against".into());
+    }
+    if is_recording && reported.start > 0 && !arguments.from_start {
+        source.forget_states();
+    }
     if is_recording && (arguments.size.is_some() || arguments.loader_delay_ms.is_some()) {
         return Err("--size and --loader-delay-ms do not go with a recording: it holds both".into());
     }
-    if is_recording && arguments.record.is_some() && arguments.frames.is_some() {
-        return Err("--record and --frames do not go with a recording: it is recorded whole".into());
+    if source.is_followed() && arguments.record.is_some() && arguments.frames.is_some() {
+        let how = "recorded whole, or a clip of it that does not run from its start";
+        return Err(format!("--record of a recording that runs from its start: it is {how}").into());
     }
     let size_px = source.size_px().or(arguments.size).unwrap_or([1280, 720]);
     overfly.looks_mut().show = arguments.view;
@@ -281,7 +298,7 @@ fn prepare(
         Writer::create(path, &header)
     });
     Ok(Run {
-        ran: if is_recording { 0..reported.end } else { reported.clone() },
+        ran: if source.is_followed() { 0..reported.end } else { reported.clone() },
         stills: chosen(reported.start, reported.len(), stills),
         draws,
         size_px,
@@ -291,7 +308,7 @@ fn prepare(
         loader: overfly.loader(default_workers().max(1))?,
         recorder: recorder.transpose()?,
         named: BTreeSet::new(),
-        columns: Columns::new(reported.len()),
+        columns: Columns::new(places.json.is_some()),
         digest: RunDigest::default(),
         diverged: None,
         video: arguments.video.clone().filter(|_| draws),
@@ -304,8 +321,8 @@ fn prepare(
 
 /// The scene as text, so that a recording is whole in itself.
 fn scene_text(arguments: &Arguments, source: &Source) -> String {
-    match (&arguments.scene, source) {
-        (None, Source::Recording(recording)) => recording.header.scene_text.clone(),
+    match (&arguments.scene, source.header()) {
+        (None, Some(header)) => header.scene_text.clone(),
         (name, _) => {
             let name = name.as_deref().unwrap_or("earth");
             let preset = config::preset(name).map(str::to_owned);

@@ -54,7 +54,8 @@ pub struct Run {
     pub pictures: Stills,
 }
 
-/// All frames. False if Ctrl-C ended them early.
+/// All frames, or those before one that cannot be read: the source's ending says so. False if Ctrl-C
+/// ended them early.
 pub fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
@@ -74,10 +75,17 @@ pub fn fly(run: &mut Run, overfly: &mut Overfly) -> Result<bool, Failure> {
             bar.abandon();
             return Ok(false);
         }
-        frame(run, overfly, (index, true), (&mut input, &mut output))?;
+        if !frame(run, overfly, (index, true), (&mut input, &mut output))? {
+            bar.abandon();
+            return Ok(true);
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if run.ran.end == run.source.frames() {
+        // There is no such frame: this finds how the file ends.
+        run.source.load(run.ran.end + run.source.lead_in());
+    }
     Ok(true)
 }
 
@@ -90,16 +98,18 @@ fn lead_in(
     (input, output): (&mut FrameInput, &mut FrameOutput),
 ) -> Result<bool, Failure> {
     let recorded = run.source.lead_in();
-    let is_recording = matches!(run.source, Source::Recording(_));
-    for index in 0..if is_recording { recorded } else { LEAD_IN_MAX } {
+    let is_followed = run.source.is_followed();
+    for index in 0..if is_followed { recorded } else { LEAD_IN_MAX } {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
         }
-        let begin = if is_recording { index } else { run.ran.start };
-        frame(run, overfly, (begin, false), (input, output))?;
+        let begin = if is_followed { index } else { run.ran.start + recorded };
+        if !frame(run, overfly, (begin, false), (input, output))? {
+            break;
+        }
         let c = &output.counts;
         let settled = c.leaves > 0 && c.splits + c.merges + c.wanted == 0 && run.coming.is_empty();
-        if !is_recording && settled {
+        if !is_followed && settled {
             break;
         }
     }
@@ -107,21 +117,25 @@ fn lead_in(
 }
 
 /// One frame: pages in, stages, what comes out. Frames of the lead-in are recorded and checked,
-/// but not counted.
+/// but not counted. False where the source has no such frame.
 fn frame(
     run: &mut Run,
     overfly: &mut Overfly,
     (index, counted): (usize, bool),
     (input, output): (&mut FrameInput, &mut FrameOutput),
-) -> Result<(), Failure> {
+) -> Result<bool, Failure> {
     let begin_ns = now_ns();
     let played = index + if counted { run.source.lead_in() } else { 0 };
-    run.source.fill(played, &run.scene, run.size_px, input);
-    if !counted && matches!(run.source, Source::Flight(..)) {
+    if !run.source.load(played) {
+        return Ok(false);
+    }
+    run.source.fill(&run.scene, run.size_px, input);
+    if !counted && !run.source.is_followed() {
         // The lead-in's clock stands one frame before the first: so a recording tells them apart.
         input.time_s -= 1.0 / run.source.rate_hz();
+        input.hold_lod = false;
     }
-    let arriving = arriving(run, played, &output.wanted);
+    let arriving = arriving(run, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
     if input.arrived.len() < arriving.len() {
         name_faults(run);
@@ -157,7 +171,7 @@ fn frame(
         recorder.frame(&record)?;
     }
     if run.diverged.is_none()
-        && let Some(stage) = run.source.difference(played, &output.digest)
+        && let Some(stage) = run.source.difference(&output.digest)
     {
         run.diverged = Some((index, stage));
     }
@@ -165,7 +179,7 @@ fn frame(
         run.digest.add(&output.digest);
         run.columns.add(end_ns - ready_ns, ready_ns - begin_ns, overfly.spans(), output);
     }
-    Ok(())
+    Ok(true)
 }
 
 /// A recording of a window may change its size.
@@ -190,8 +204,8 @@ fn name_faults(run: &mut Run) {
 }
 
 /// The pages of this frame: as recorded; else what was wanted and is due.
-fn arriving(run: &mut Run, played: usize, wanted: &[PageKey]) -> Vec<PageKey> {
-    if let Some(keys) = run.source.arrived(played) {
+fn arriving(run: &mut Run, wanted: &[PageKey]) -> Vec<PageKey> {
+    if let Some(keys) = run.source.arrived() {
         return keys.to_vec();
     }
     for &key in wanted {

@@ -8,7 +8,7 @@
 use super::replay::{default_workers, parse_size};
 use super::source::recording_header;
 use super::still::parse_show;
-use super::{DIVERGED, Failure, NO_DEVICE, place_of};
+use super::{DIVERGED, Failure, NO_DEVICE, place_of, read_by};
 use crate::viewer::fly::Eye;
 use crate::viewer::screenshot::Sidecar;
 use crate::viewer::script::{STEPS, Script};
@@ -20,7 +20,7 @@ use overfly::core::geodesy::Geodetic;
 use overfly::core::settings::SceneSettings;
 use overfly::core::units::Radians;
 use overfly::render_vk::Show;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// What `view` takes.
@@ -132,12 +132,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 fn options(arguments: &Arguments) -> Result<Options, Failure> {
-    let inputs = [arguments.flight.as_ref(), arguments.scene.as_ref()];
-    let mut taken: Vec<PathBuf> = inputs
-        .into_iter()
-        .flatten()
-        .filter_map(|path| Path::new(path).canonicalize().ok())
-        .collect();
+    let mut taken = read_by([arguments.flight.as_ref(), arguments.scene.as_ref()]);
     let record = arguments.record.as_deref().map(|path| place_of(path, &mut taken)).transpose()?;
     let script = arguments.script.as_ref().map(|text| text.parse::<Script>()).transpose();
     let script = script.map_err(|fault: script::ScriptFault| format!("--script: {fault}"))?;

@@ -133,9 +133,9 @@ impl Session {
         let overfly = Overfly::new(&plan.scene, plan.workers)?;
         let open = |name: &String| Track::open(name, &plan.scene, &overfly);
         let track = plan.flight.as_ref().map(open).transpose()?;
-        let transport = track.as_ref().map_or(Transport::new(1, 1.0), |track| {
-            Transport::new(track.views.len(), track.rate_hz)
-        });
+        let transport = track
+            .as_ref()
+            .map_or(Transport::new(1, 1.0), |track| Transport::new(track.frames, track.rate_hz));
         let recorder = plan.record.as_ref().map(|path| {
             let name = track.as_ref().map_or("view", |track| track.name.as_str());
             let mut header = Header::recording(name, RECORDED_HZ, &plan.scene)

@@ -2,16 +2,15 @@
 //!
 //! In:    a bundled flight's name, an `.ovf` file or one that `import` reads; a scene.
 //! Out:   [`Track`]: a view for each frame.
-//! Keeps: all views in memory.
-//! Not here: which frame is shown (`play`), held digests (`cli::source`).
+//! Keeps: the view that was shown last.
+//! Not here: which frame is shown (`play`), files, held digests (`cli::source`).
 
 use crate::cli::Failure;
-use crate::cli::source::{flight_of, recording_header};
+use crate::cli::source::Source;
 use overfly::Overfly;
 use overfly::core::camera::View;
+use overfly::core::frame::FrameInput;
 use overfly::core::settings::SceneSettings;
-use overfly::replay::{BUNDLED, Flight, Recording, view_of};
-use std::path::Path;
 
 /// Views at a steady rate.
 pub struct Track {
@@ -19,8 +18,12 @@ pub struct Track {
     pub name: String,
     /// Frames a second.
     pub rate_hz: f64,
-    /// The first view of each frame; at least one. Their size is the window's, not their own.
-    pub views: Vec<View>,
+    /// How many there are; at least one.
+    pub frames: usize,
+    source: Source,
+    scene: SceneSettings,
+    input: FrameInput,
+    shown: View,
 }
 
 impl Track {
@@ -30,36 +33,33 @@ impl Track {
     /// # Errors
     /// There is no such flight or file, or no frame in it.
     pub fn open(name: &str, scene: &SceneSettings, overfly: &Overfly) -> Result<Self, Failure> {
-        let track = if BUNDLED.contains(&name) {
-            Self::of_flight(&overfly.flight(name)?, scene)
-        } else if recording_header(name)?.is_some() {
-            Self::of_recording(Recording::open(Path::new(name))?)
-        } else {
-            Self::of_flight(&flight_of(name)?.0, scene)
-        };
-        if track.views.is_empty() {
+        let mut source = Source::open_any(name, overfly)?;
+        let mut input = FrameInput::default();
+        if source.load(0) {
+            source.fill(scene, [1, 1], &mut input);
+        }
+        let Some(shown) = input.views.first().copied() else {
             return Err(format!("{name} holds no frame that can be shown").into());
-        }
-        Ok(track)
+        };
+        Ok(Self {
+            name: source.name().to_owned(),
+            rate_hz: source.rate_hz(),
+            frames: source.frames() + source.lead_in(),
+            source,
+            scene: scene.clone(),
+            input,
+            shown,
+        })
     }
 
-    fn of_flight(flight: &Flight, scene: &SceneSettings) -> Self {
-        let lens = &scene.views[0];
-        let view = |pose| view_of(pose, lens, [1, 1], &scene.body);
-        Self {
-            name: flight.name.clone(),
-            rate_hz: flight.rate_hz,
-            views: flight.poses.iter().map(view).collect(),
+    /// The first view of a frame. Its size is the window's, not its own. Where the frame cannot be
+    /// read or has no view it is the one that was asked for before.
+    pub fn view(&mut self, frame: usize) -> View {
+        if self.source.load(frame) {
+            self.source.fill(&self.scene, [1, 1], &mut self.input);
+            self.shown = self.input.views.first().copied().unwrap_or(self.shown);
         }
-    }
-
-    fn of_recording(recording: Recording) -> Self {
-        let views = recording.frames.iter().filter_map(|frame| frame.views.first().copied());
-        Self {
-            views: views.collect(),
-            rate_hz: recording.header.rate_hz,
-            name: recording.header.name,
-        }
+        self.shown
     }
 }
 
@@ -72,22 +72,26 @@ mod tests {
     fn a_recording_is_seen_as_it_was_and_an_empty_one_is_refused() {
         let scene = overfly::config::load("small").unwrap();
         let overfly = Overfly::new(&scene, 0).unwrap();
-        let flight = Track::open("poles", &scene, &overfly).unwrap();
-        assert!(flight.views.len() > 100, "{}", flight.views.len());
+        let mut flight = Track::open("poles", &scene, &overfly).unwrap();
+        assert!(flight.frames > 100, "{}", flight.frames);
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("two.ovf");
         for frames in [2, 0] {
             let header = Header::recording("two", 60.0, &scene);
             let mut writer = Writer::create(&file, &header).unwrap();
-            for view in &flight.views[..frames] {
-                let views = vec![*view, flight.views[9]];
+            for frame in 0..frames {
+                let views = vec![flight.view(frame), flight.view(9)];
                 writer.frame(&RecordedFrame { views, ..Default::default() }).unwrap();
             }
             writer.finish().unwrap();
             let track = Track::open(&file.display().to_string(), &scene, &overfly);
             match frames {
                 0 => assert!(track.err().unwrap().to_string().contains("no frame")),
-                _ => assert_eq!(track.unwrap().views, flight.views[..2]),
+                _ => {
+                    let mut track = track.unwrap();
+                    assert_eq!(track.frames, 2);
+                    assert_eq!([1, 0, 1].map(|i| track.view(i)), [1, 0, 1].map(|i| flight.view(i)));
+                }
             }
         }
         let missing = Track::open("nowhere", &scene, &overfly).err().unwrap().to_string();

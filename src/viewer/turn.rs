@@ -87,8 +87,8 @@ impl Session {
         let lens = &self.plan.scene.views[0];
         let (motion, look_px) = (self.motion(), std::mem::take(&mut self.look_px));
         let moves = motion != super::fly::Motion::default() || look_px != [0.0; 2];
-        if let Some(track) = self.track.as_ref().filter(|_| self.follows) {
-            let view = View { size_px, ..track.views[self.transport.frame()] };
+        if let Some(track) = self.track.as_mut().filter(|_| self.follows) {
+            let view = View { size_px, ..track.view(self.transport.frame()) };
             self.eye = Eye::of_view(&view, &body);
             if !moves {
                 return view;
@@ -347,8 +347,8 @@ mod tests {
         let shown = session.transport.frame();
         assert!(shown > 10);
         let view = session.view.unwrap();
-        let track = session.track.as_ref().unwrap();
-        assert_eq!(view, View { size_px: CANVAS.size_px, ..track.views[shown] });
+        let track = session.track.as_mut().unwrap();
+        assert_eq!(view, View { size_px: CANVAS.size_px, ..track.view(shown) });
         session.act(Action::Fly(Way::Right), true).unwrap();
         frames(&mut session, 5);
         assert!(!session.follows);
@@ -361,8 +361,8 @@ mod tests {
         tap(&mut session, Action::Follow);
         tap(&mut session, Action::Seek(crate::viewer::play::Seek::End));
         frames(&mut session, 1);
-        let track = session.track.as_ref().unwrap();
-        let last = View { size_px: CANVAS.size_px, ..*track.views.last().unwrap() };
+        let track = session.track.as_mut().unwrap();
+        let last = View { size_px: CANVAS.size_px, ..track.view(track.frames - 1) };
         assert_eq!(session.view.unwrap(), last);
         assert!(session.lines.iter().any(|line| line.contains("paused")), "{:?}", session.lines);
     }

@@ -103,3 +103,133 @@ fn a_recording_that_diverges_names_frame_and_stage() {
         "{played:?}"
     );
 }
+
+/// A flight in a file that takes little time: a bundled one looks for its ground first, and flies
+/// low.
+fn short_flight(folder: &Path) -> String {
+    let body = overfly::config::load("small").unwrap().body;
+    let mut flight = overfly::replay::flight("poles", &body, &|_| 100.0).unwrap();
+    flight.poses.truncate(600);
+    flight.raised(500.0);
+    let path = folder.join("short.ovf");
+    flight.write(&path).unwrap();
+    path.display().to_string()
+}
+
+fn record_flight(flight: &str, folder: &Path) -> String {
+    let file = folder.join("recorded.ovf").display().to_string();
+    let small = ["--no-render", "--scene", "small", "--size", "160x90", "--record", &file];
+    let done = overfly(&[&["replay", flight], &small[..]].concat());
+    assert_eq!(done.code, 0, "{done:?}");
+    file
+}
+
+/// A clip of a recording is what a clip of its flight is, from however far behind in the file.
+#[test]
+fn a_clip_of_a_recording_comes_up_at_its_first_frame_or_runs_from_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let (small, size) = (["--scene", "small"], ["--size", "160x90"]);
+    let flight_file = short_flight(folder.path());
+    let file = record_flight(&flight_file, folder.path());
+    let clip = ["--no-render", "--frames", "300..340"];
+    let flight = overfly(&[&["replay", &flight_file][..], &small, &size, &clip].concat());
+    let cold = overfly(&[&["replay", &file], &clip[..]].concat());
+    assert_eq!((cold.code, cold.digest_frames()), (0, 40), "{cold:?}");
+    assert_eq!(cold.digest(), flight.digest());
+    assert!(cold.out.contains("came up at frame 300: not held against"), "{cold:?}");
+    let exact = overfly(&[&["replay", &file, "--from-start"], &clip[..]].concat());
+    assert_eq!((exact.code, exact.digest_frames()), (0, 40), "{exact:?}");
+    assert!(exact.out.contains("same as recorded"), "{exact:?}");
+    let cut = folder.path().join("cut.ovf").display().to_string();
+    let cut_out = overfly(&[&["replay", &file, "--record", &cut], &clip[..]].concat());
+    assert_eq!((cut_out.code, cut_out.digest()), (0, cold.digest()), "{cut_out:?}");
+    let again = overfly(&["replay", &cut, "--no-render"]);
+    assert!(again.out.contains("same as recorded"), "{again:?}");
+    assert_eq!(again.digest(), cold.digest());
+    let refused = overfly(&["replay", &flight_file, "--frames", "0..9", "--from-start"]);
+    assert!(refused.code == 2 && refused.err.contains("--from-start"), "{refused:?}");
+}
+
+#[test]
+fn frames_behind_a_damaged_one_are_reached() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record_flight(&short_flight(folder.path()), folder.path());
+    let clip = ["replay", &file, "--no-render", "--frames", "590..600"];
+    let whole = overfly(&clip);
+    let mut bytes = std::fs::read(&file).unwrap();
+    let at = bytes.len() / 2;
+    bytes[at] ^= 4;
+    std::fs::write(&file, bytes).unwrap();
+    let all = overfly(&["replay", &file, "--no-render"]);
+    assert!(all.code == 2 && (100..500).contains(&all.digest_frames()), "{all:?}");
+    let behind = overfly(&clip);
+    assert_eq!((behind.code, behind.digest()), (0, whole.digest()), "{behind:?}");
+}
+
+#[test]
+fn a_recording_is_never_written_over_what_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let fixes = (0..12).map(|s| format!("B1200{s:02}46{:02}000N00800000EA0200002000\n", s));
+    let igc = format!("AXXX001\nHFDTE010620\n{}", fixes.collect::<String>());
+    let (flight, map) = (path("two.igc"), path("two.igc.columns.ron"));
+    std::fs::write(&flight, &igc).unwrap();
+    std::fs::write(&map, "Columns(time: (column: 1), latitude: 2, longitude: 3)").unwrap();
+    let numbered = format!("{flight}#1");
+    let (stopped, old) = (path("x.ovf.part"), path("x.ovf"));
+    let (file, _) = record(folder.path(), &["--scene", "small", "--frames", "0..9"]);
+    std::fs::copy(&file, &stopped).unwrap();
+    std::fs::copy(&file, &old).unwrap();
+    let bytes = std::fs::read(&stopped).unwrap();
+    for (read, command, option, written) in [
+        (&flight, "replay", "--record", &flight),
+        (&numbered, "replay", "--record", &flight),
+        (&numbered, "replay", "--json", &flight),
+        (&numbered, "replay", "--record", &map),
+        (&numbered, "measure", "--json", &flight),
+        (&numbered, "budget", "--record", &flight),
+        (&numbered, "view", "--record", &flight),
+        (&stopped, "replay", "--record", &old),
+        (&stopped, "replay", "--record", &stopped),
+    ] {
+        let refused = overfly(&[command, read, option, written, "--scene", "small"]);
+        assert_eq!(refused.code, 2, "{command} {read} {option} {written}: {refused:?}");
+        assert!(refused.err.contains("is an input or another output"), "{refused:?}");
+    }
+    assert_eq!(std::fs::read_to_string(&flight).unwrap(), igc);
+    assert_eq!(std::fs::read(&stopped).unwrap(), bytes);
+}
+
+/// The shell's limit on file sizes stands for a disk that is full: writes fail half way.
+#[test]
+fn a_full_disk_is_named_and_what_was_recorded_before_plays() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("full.ovf").display().to_string();
+    let limited = |rest: &str| {
+        let script = format!("trap '' XFSZ; ulimit -f 100; exec \"$0\" {rest}");
+        let run = super::command_line::command();
+        let shell = std::process::Command::new("sh")
+            .args(["-c", &script, &run.get_program().to_string_lossy(), &file])
+            .output()
+            .unwrap();
+        (shell.status.code(), String::from_utf8_lossy(&shell.stderr).into_owned())
+    };
+    let recording =
+        "replay rainier --no-render --scene small --size 160x90 --frames 0..5000 --record \"$1\"";
+    let plays = |file: &str| {
+        let played = overfly(&["replay", file, "--no-render"]);
+        assert!(played.code == 0 && played.out.contains("no end mark"), "{played:?}");
+        assert!(played.out.contains("same as recorded"), "{played:?}");
+        played.digest_frames()
+    };
+    let (code, said) = limited(recording);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("full.ovf: cannot write at byte ") && said.contains("arge"), "{said}");
+    let frames = plays(&file);
+    assert!(frames > 100, "{frames}");
+    let bytes = std::fs::read(&file).unwrap();
+    let (code, said) = limited(recording);
+    assert!(code == Some(2) && said.contains("full.ovf.part: cannot write at byte "), "{said}");
+    assert_eq!(std::fs::read(&file).unwrap(), bytes, "what was there stays until it is replaced");
+    assert_eq!(plays(&format!("{file}.part")), frames);
+}

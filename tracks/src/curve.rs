@@ -217,31 +217,33 @@ impl Curve {
         count.saturating_add(1)
     }
 
-    /// The poses at a rate, from the first fix on, rounded to the grids of overfly's own flights:
-    /// 0.1 mm, a quarter of a millimetre, a tenth of an arc second.
+    /// The poses at a rate, from the first fix on.
     pub fn poses(&self, rate_hz: f64) -> impl Iterator<Item = Pose> + '_ {
-        (0..self.count(rate_hz)).map(move |index| {
-            let time_s = index as f64 / rate_hz;
-            let pose = self.pose(time_s);
-            let round = |value: f64, grid: f64| (value / grid).round() * grid;
-            let angle = |angle: Radians| Radians(round(angle.0, GRID_ATTITUDE_RAD));
-            let lon_rad = round(pose.at.lon_rad, GRID_RAD[1]);
-            Pose {
-                at: Geodetic {
-                    lat_rad: round(pose.at.lat_rad, GRID_RAD[0]).clamp(-PI / 2.0, PI / 2.0),
-                    lon_rad: if lon_rad.abs() > PI {
-                        lon_rad - TAU * lon_rad.signum()
-                    } else {
-                        lon_rad
-                    },
-                    height_m: round(pose.at.height_m, GRID_M),
+        (0..self.count(rate_hz)).map(move |index| self.frame(index, rate_hz))
+    }
+
+    /// One of the poses at a rate, rounded to the grids of overfly's own flights: 0.1 mm, a quarter
+    /// of a millimetre, a tenth of an arc second.
+    pub fn frame(&self, index: u64, rate_hz: f64) -> Pose {
+        let pose = self.pose(index as f64 / rate_hz);
+        let round = |value: f64, grid: f64| (value / grid).round() * grid;
+        let angle = |angle: Radians| Radians(round(angle.0, GRID_ATTITUDE_RAD));
+        let lon_rad = round(pose.at.lon_rad, GRID_RAD[1]);
+        Pose {
+            at: Geodetic {
+                lat_rad: round(pose.at.lat_rad, GRID_RAD[0]).clamp(-PI / 2.0, PI / 2.0),
+                lon_rad: if lon_rad.abs() > PI {
+                    lon_rad - TAU * lon_rad.signum()
+                } else {
+                    lon_rad
                 },
-                heading: angle(pose.heading),
-                pitch: angle(pose.pitch),
-                roll: angle(pose.roll),
-                ..pose
-            }
-        })
+                height_m: round(pose.at.height_m, GRID_M),
+            },
+            heading: angle(pose.heading),
+            pitch: angle(pose.pitch),
+            roll: angle(pose.roll),
+            ..pose
+        }
     }
 
     /// Raises the curve where `ground_m` at its place, looked at every `step_s`, leaves less than

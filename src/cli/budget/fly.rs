@@ -124,7 +124,7 @@ fn one_run(
         max_ns: shown(lead_in.iter().copied().max().unwrap_or(0)),
     });
     // A recording is played from its beginning, whatever is asked for.
-    let skipped = if flown.source.size_px().is_some() { 0..frames.start } else { 0..0 };
+    let skipped = if flown.source.is_followed() { 0..frames.start } else { 0..0 };
     for index in skipped {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);

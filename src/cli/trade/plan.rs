@@ -7,6 +7,7 @@
 
 use crate::cli::Failure;
 use crate::cli::flown::{Flown, Manner};
+use crate::cli::import;
 use crate::cli::replay::{default_workers, parse_frames, parse_size};
 use crate::cli::source::recording_header;
 use overfly::config;
@@ -139,7 +140,7 @@ impl Plan {
         let contents = format!("{:?}", flown.overfly.sources().contents());
         add_bytes(&mut origin, contents.as_bytes());
         if !BUNDLED.contains(&name.as_str()) {
-            add_bytes(&mut origin, &std::fs::read(name)?);
+            add_bytes(&mut origin, &std::fs::read(import::split(name).0)?);
         }
         Ok(Self {
             clips: clips(&ways.frames, ways.every, ways.clip, 0.0),
