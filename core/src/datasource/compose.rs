@@ -101,6 +101,14 @@ pub struct Plots<'a> {
     readings: Vec<Reading>,
 }
 
+/// The layers that show at a point.
+struct Top {
+    /// Index of the lowest that was read.
+    first: usize,
+    /// It lets nothing through.
+    covers: bool,
+}
+
 /// A tile that a page is made from.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct Need {
@@ -110,6 +118,14 @@ pub struct Need {
     pub key: PageKey,
 }
 
+/// What lies beneath where there is no planet, or where it does not show.
+const NOTHING: Sample = Sample {
+    height_m: 0.0,
+    layers: Layers { roughness: 0, rock: 0, moisture: 0, temperature: 0 },
+    ruggedness: 0.0,
+};
+/// Points whose readings are kept while the planet is sampled.
+const AT_ONCE: usize = 512;
 /// Slope and curvature of the geoid, many times over: metres a metre.
 const GEOID_SLOPE: f64 = 6e-4;
 const GEOID_RESIDUAL: f64 = 2e-4;
@@ -177,8 +193,16 @@ impl Bed {
     }
 
     fn planet_at(&self, point: IVec3) -> Sample {
-        let none = Sample { height_m: 0.0, layers: Layers::default(), ruggedness: 0.0 };
-        self.planet.as_ref().map_or(none, |planet| planet.sample(normal_of(point)))
+        self.planet.as_ref().map_or(NOTHING, |planet| planet.sample(normal_of(point)))
+    }
+
+    fn planet_at_all(&self, points: impl Iterator<Item = IVec3>) -> Vec<Sample> {
+        let normals: Vec<_> = points.map(normal_of).collect();
+        let mut samples = vec![NOTHING; normals.len()];
+        if let Some(planet) = &self.planet {
+            planet.samples(&normals, &mut samples);
+        }
+        samples
     }
 }
 
@@ -215,18 +239,46 @@ impl<'a> Plots<'a> {
 
     /// The ground at a lattice point of the page or next to it.
     pub fn ground(&mut self, point: IVec3) -> Ground {
-        let mut first = self.plots.len();
-        let mut covered = false;
-        while first > 0 && !covered {
-            first -= 1;
-            self.readings[first] = self.plots[first].read(point);
-            covered = self.readings[first].weight == 1.0;
+        let top = self.read(point);
+        let beneath = if top.covers { NOTHING } else { self.bed.planet_at(point) };
+        self.raised(point, top.first, &beneath)
+    }
+
+    /// [`Plots::ground`] of each of many points, to the bit: the planet is sampled at all at once.
+    pub fn grounds(&mut self, points: &[IVec3]) -> Vec<Ground> {
+        let mut grounds = Vec::with_capacity(points.len());
+        for points in points.chunks(AT_ONCE) {
+            let (mut tops, mut readings) = (Vec::new(), Vec::new());
+            for &point in points {
+                tops.push(self.read(point));
+                readings.extend_from_slice(&self.readings);
+            }
+            let bare = points.iter().zip(&tops).filter(|(_, top)| !top.covers);
+            let beneath = self.bed.planet_at_all(bare.map(|(&point, _)| point));
+            let mut beneath = beneath.iter();
+            let own = self.plots.len();
+            for (i, (&point, top)) in points.iter().zip(&tops).enumerate() {
+                self.readings.copy_from_slice(&readings[own * i..][..own]);
+                let sample = (!top.covers).then(|| beneath.next()).flatten();
+                grounds.push(self.raised(point, top.first, sample.unwrap_or(&NOTHING)));
+            }
         }
-        let beneath = if covered {
-            Sample { height_m: 0.0, layers: Layers::default(), ruggedness: 0.0 }
-        } else {
-            self.bed.planet_at(point)
-        };
+        grounds
+    }
+
+    /// Reads layers from the top down to one that covers all beneath.
+    fn read(&mut self, point: IVec3) -> Top {
+        let mut top = Top { first: self.plots.len(), covers: false };
+        while top.first > 0 && !top.covers {
+            top.first -= 1;
+            self.readings[top.first] = self.plots[top.first].read(point);
+            top.covers = self.readings[top.first].weight == 1.0;
+        }
+        top
+    }
+
+    /// The ground that layers make of what lies beneath the first that was read.
+    fn raised(&self, point: IVec3, first: usize, beneath: &Sample) -> Ground {
         let mut ground = Ground {
             height_m: beneath.height_m,
             sea_level_m: 0.0,

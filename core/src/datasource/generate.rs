@@ -139,10 +139,9 @@ impl Generator {
         let mut page = self.blank(key, None);
         page.bounds.fill(Bound::UNKNOWN);
         let mut plots = Plots::new(&self.bed, &needs, tiles);
-        for (i, j) in places() {
-            let ground = plots.ground(key.sample(i, j));
-            put(&mut page, j * PAGE_SIDE + i, &ground);
-        }
+        let points: Vec<_> = places().map(|(i, j)| key.sample(i, j)).collect();
+        let grounds = plots.grounds(&points);
+        grounds.iter().enumerate().for_each(|(at, ground)| put(&mut page, at, ground));
         page.content = content_of(&page);
         Arc::from(page)
     }
@@ -180,13 +179,13 @@ impl Generator {
     }
 
     fn fill_samples(&self, page: &mut Page, plots: &mut Plots<'_>) {
-        for (i, j) in places() {
-            let point = page.key.sample(i, j);
-            let ground = plots.ground(point);
-            put(page, j * PAGE_SIDE + i, &ground);
+        let points: Vec<_> = places().map(|(i, j)| page.key.sample(i, j)).collect();
+        let grounds = plots.grounds(&points);
+        for (((i, j), point), ground) in places().zip(points).zip(&grounds) {
+            put(page, j * PAGE_SIDE + i, ground);
             if i % BOUND_STRIDE == 0 && j % BOUND_STRIDE == 0 {
                 let place = j / BOUND_STRIDE * BOUND_SIDE + i / BOUND_STRIDE;
-                page.bounds[place] = self.bound(page, point, &ground, plots);
+                page.bounds[place] = self.bound(page, point, ground, plots);
             }
         }
         if self.bed.is_procedural() {
@@ -197,8 +196,9 @@ impl Generator {
     /// Lowers the bounds of a page of the planet to what the ground around its samples shows.
     fn tighten(&self, page: &mut Page, plots: &mut Plots<'_>) {
         let site = Site { key: page.key, patch_depth: self.patch_depth };
-        let ground_m = |point| plots.ground(point).height_m;
-        let Some(probes) = Probes::new(site, &page.heights_m, ground_m) else { return };
+        let grounds_m =
+            |points: &[IVec3]| plots.grounds(points).iter().map(|g| g.height_m).collect();
+        let Some(probes) = Probes::new(site, &page.heights_m, grounds_m) else { return };
         for (j, i) in (0..BOUND_SIDE).flat_map(|j| (0..BOUND_SIDE).map(move |i| (j, i))) {
             let at = BOUND_STRIDE * j * PAGE_SIDE + BOUND_STRIDE * i;
             let point = page.key.sample(BOUND_STRIDE * i, BOUND_STRIDE * j);
@@ -323,10 +323,17 @@ impl Generator {
     /// Normals by central differences over the lattice cross, whichever page its arms lie in; and
     /// the rock that shows where real ground is steep.
     fn fill_normals(&self, page: &mut Page, plots: &mut Plots<'_>) {
+        let arms_of = |(i, j)| cross_of(page.key.sample(i, j), page.key.step());
+        let is_border = |at: usize| at.is_multiple_of(PAGE_SIDE - 1);
+        let border = places().filter(|&(i, j)| is_border(i) || is_border(j));
+        let outside = border.flat_map(arms_of).filter(|&arm| place_within(page.key, arm).is_none());
+        let outside: Vec<_> = outside.collect();
+        // In the order in which they are come across.
+        let mut beyond = plots.grounds(&outside).into_iter();
         for (i, j) in places() {
             let point = page.key.sample(i, j);
             let arms = cross_of(point, page.key.step());
-            let [a, b, c, d] = arms.map(|arm| self.position(page, plots, arm));
+            let [a, b, c, d] = arms.map(|arm| self.position(page, &mut beyond, arm));
             let normal = (a - c).cross(b - d).normalize();
             let up = normal_of(point);
             let inward = normal.dot(up) < 0.0;
@@ -339,12 +346,18 @@ impl Generator {
         }
     }
 
-    fn position(&self, page: &Page, plots: &mut Plots<'_>, point: IVec3) -> DVec3 {
+    /// Where a point of the page lies, or the next of the points beyond it.
+    fn position(
+        &self,
+        page: &Page,
+        beyond: &mut impl Iterator<Item = Ground>,
+        point: IVec3,
+    ) -> DVec3 {
         let normal = normal_of(point);
         let height_m = match place_within(page.key, point) {
             Some(at) => f64::from(page.heights_m[at]) + page.sea_level_m(at),
             None => {
-                let ground = plots.ground(point);
+                let ground = beyond.next().expect("all arms that leave the page were looked at");
                 f64::from(narrow(ground.height_m)) + f64::from(narrow(ground.sea_level_m))
             }
         };

@@ -111,22 +111,27 @@ impl Reach {
 }
 
 impl Probes {
-    /// Looks at the ground in and around a page; `heights_m` are those of its samples, `ground_m`
-    /// is the height at any lattice point. `None` where the lattice has no points between samples.
+    /// Looks at the ground in and around a page; `heights_m` are those of its samples, `grounds_m`
+    /// gives the heights at any lattice points. `None` where the lattice has no points between
+    /// samples.
     pub fn new(
         site: Site,
         heights_m: &[f32; SAMPLES],
-        mut ground_m: impl FnMut(IVec3) -> f64,
+        mut grounds_m: impl FnMut(&[IVec3]) -> Vec<f64>,
     ) -> Option<Self> {
         if site.key.step() < PARTS {
             return None;
         }
         let reach = Reach::of(site.patch_depth);
         let apron = reach.odd;
-        let field = Field::new(site, apron, heights_m, &mut ground_m);
+        let field = Field::new(site, apron, heights_m, &mut grounds_m);
         let side = BLOCKS + 2 * apron;
         let places = (0..side).flat_map(|y| (0..side).map(move |x| (x, y)));
-        let blocks = places.map(|at| field.block(at, &mut ground_m)).collect();
+        let probes = places.clone().flat_map(probes_of);
+        let points: Vec<_> = probes.map(|(cell, parts)| field.point(cell, parts)).collect();
+        let seen_m = grounds_m(&points);
+        let seen_m = seen_m.chunks_exact(BOUND_STRIDE * BOUND_STRIDE);
+        let blocks = places.zip(seen_m).map(|(at, seen_m)| field.block(at, seen_m)).collect();
         Some(Self { reach, side, blocks })
     }
 
@@ -170,18 +175,23 @@ impl Field {
         site: Site,
         blocks: usize,
         own_m: &[f32; SAMPLES],
-        ground_m: &mut impl FnMut(IVec3) -> f64,
+        grounds_m: &mut impl FnMut(&[IVec3]) -> Vec<f64>,
     ) -> Self {
         let apron = blocks * BOUND_STRIDE;
         let side = PAGE_SIDE + 2 * apron;
         let within = |at: usize| (apron..apron + PAGE_SIDE).contains(&at);
         let mut field = Self { site, apron, side, heights_m: Vec::with_capacity(side * side) };
-        for (j, i) in (0..side).flat_map(|j| (0..side).map(move |i| (j, i))) {
-            let height_m = if within(i) && within(j) {
+        let places = (0..side).flat_map(|j| (0..side).map(move |i| (i, j)));
+        let is_own = |(i, j): (usize, usize)| within(i) && within(j);
+        let around = places.clone().filter(|&at| !is_own(at));
+        let points: Vec<_> = around.map(|at| field.point(at, (0, 0))).collect();
+        let mut around_m = grounds_m(&points).into_iter();
+        for (i, j) in places {
+            let height_m = if is_own((i, j)) {
                 f64::from(own_m[(j - apron) * PAGE_SIDE + i - apron])
             } else {
                 // As the page that holds it would keep it.
-                f64::from(narrow(ground_m(field.point((i, j), (0, 0)))))
+                f64::from(narrow(around_m.next().expect("a height for every point")))
             };
             field.heights_m.push(height_m);
         }
@@ -192,8 +202,8 @@ impl Field {
         self.heights_m[j * self.side + i]
     }
 
-    /// A block: all of its samples, the middles of its edges, its probes.
-    fn block(&self, (x, y): (usize, usize), ground_m: &mut impl FnMut(IVec3) -> f64) -> Block {
+    /// A block: all of its samples, the middles of its edges, what its probes have seen.
+    fn block(&self, (x, y): (usize, usize), seen_m: &[f64]) -> Block {
         let mut block = Block::EMPTY;
         let (i0, j0) = (x * BOUND_STRIDE, y * BOUND_STRIDE);
         for j in j0..=j0 + BOUND_STRIDE {
@@ -215,9 +225,7 @@ impl Field {
                 block.even_m = greater(block.even_m, self.bend_m((i, j)));
             }
         }
-        for (j, i) in (0..BOUND_STRIDE).flat_map(|j| (0..BOUND_STRIDE).map(move |i| (j, i))) {
-            let (cell, parts) = ((i0 + i, j0 + j), probe((i, j)));
-            let seen_m = ground_m(self.point(cell, parts));
+        for ((cell, parts), &seen_m) in probes_of((x, y)).zip(seen_m) {
             block.see(seen_m);
             let [odd_m, even_m] = self.planes_m(cell, parts).map(|m| (seen_m - m).abs());
             block.odd_m = greater(block.odd_m, odd_m);
@@ -300,6 +308,12 @@ impl Field {
 /// The least share of an odd triangle's bend that is expected of the even ones within it: a half
 /// on smooth ground, more at a crease.
 const HALVED: f64 = 0.7;
+
+/// The cells of a block, and where each is probed.
+fn probes_of((x, y): (usize, usize)) -> impl Iterator<Item = ((usize, usize), (i32, i32))> {
+    let cells = (0..BOUND_STRIDE).flat_map(|j| (0..BOUND_STRIDE).map(move |i| (i, j)));
+    cells.map(move |(i, j)| ((x * BOUND_STRIDE + i, y * BOUND_STRIDE + j), probe((i, j))))
+}
 
 /// Where the cell (i, j) of a block is probed.
 fn probe((i, j): (usize, usize)) -> (i32, i32) {
@@ -385,7 +399,8 @@ mod tests {
                 heights_m[j * PAGE_SIDE + i] = crate::geodesy::narrow(ground_m(key.sample(i, j)));
             }
             let site = Site { key, patch_depth: 4 };
-            let found = Probes::new(site, &heights_m, ground_m).unwrap().around(8, 8);
+            let grounds_m = |points: &[IVec3]| points.iter().map(|&at| ground_m(at)).collect();
+            let found = Probes::new(site, &heights_m, grounds_m).unwrap().around(8, 8);
             // Half a cell away from both ends the bowl lies a quarter of its strength lower.
             let [odd_m, even_m] = found.residual_m;
             assert!(even_m <= HALVED * bowl + 1e-3 && odd_m <= bowl + 1e-3, "{found:?}");
@@ -398,7 +413,7 @@ mod tests {
         let heights_m = [0.0_f32; SAMPLES];
         for (x, y) in [(0, 0), (15, 0), (0, 15), (15, 15)] {
             let site = Site { key: PageKey::new(0, 4, x, y), patch_depth: 4 };
-            let field = Field::new(site, 2, &heights_m, &mut |_| 0.0);
+            let field = Field::new(site, 2, &heights_m, &mut |points| vec![0.0; points.len()]);
             for at in [(0, 0), (5, 40), (40, 5), (80, 28), (28, 80), (80, 80)] {
                 let point = field.point(at, (3, 5));
                 assert_eq!(point.abs().element_sum(), RADIUS, "{point}");
@@ -421,7 +436,8 @@ mod tests {
             for (j, i) in (0..PAGE_SIDE).flat_map(|j| (0..PAGE_SIDE).map(move |i| (j, i))) {
                 heights_m[j * PAGE_SIDE + i] = narrow(ground_m(key.sample(i, j)));
             }
-            let found = Probes::new(Site { key, patch_depth: 4 }, &heights_m, ground_m).unwrap();
+            let grounds_m = |points: &[IVec3]| points.iter().map(|&at| ground_m(at)).collect();
+            let found = Probes::new(Site { key, patch_depth: 4 }, &heights_m, grounds_m).unwrap();
             let Findings { residual_m, range_m, relief_m } = found.around(i, j);
             [residual_m[0], residual_m[1], range_m[0], range_m[1], relief_m]
         };

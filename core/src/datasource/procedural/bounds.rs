@@ -45,6 +45,7 @@ impl Growth {
 }
 
 /// Three times a small ruggedness, level at 1.
+#[inline(always)]
 pub(super) fn early(ruggedness: f64) -> f64 {
     let smooth = 1.0 - ruggedness;
     1.0 - smooth * smooth * smooth

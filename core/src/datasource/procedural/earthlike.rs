@@ -8,9 +8,12 @@
 use glam::DVec3;
 
 use super::bounds::{Bounds, Growth, SHARP, SMOOTH, TURNING, Term, UNERODED, early};
+use super::lanes::BLOCK;
 use super::noise::{Lattice, Lattices, PEAK, mix, ramp, round};
 use super::outline::{Outline, Shape};
 use super::{Layers, ProceduralSettings, Sample, byte};
+
+mod block;
 
 /// The Earth-like planet.
 pub(super) struct Earthlike {
@@ -68,11 +71,45 @@ struct Detail {
 
 /// The ground at one point while it is being made.
 #[derive(Clone, Copy)]
-struct Ground<'a> {
+struct Ground {
     height_m: f64,
     /// Squared slope of what is longer than details.
     steep: f64,
-    shape: &'a Shape,
+    shape: Shape,
+}
+
+/// Coasts and ridges at one point while they are being made.
+#[derive(Clone, Copy)]
+struct Range {
+    height_m: f64,
+    slope: DVec3,
+    /// How much of the next octave's ridges is left.
+    crest: f64,
+}
+
+/// Direction across gullies, and their share of their amplitude.
+struct Steering {
+    side: DVec3,
+    strength: f64,
+}
+
+/// Fine detail at one point while it is being made.
+#[derive(Clone, Copy)]
+struct Fine {
+    height_m: f64,
+    /// Share of the rugged part of the next octave.
+    local: f64,
+    /// Sum of the noise so far, the last octave's most.
+    swell: f64,
+    last: f64,
+}
+
+/// What short details depend on besides their noise.
+#[derive(Clone, Copy)]
+struct Mood {
+    lively: f64,
+    rugged: f64,
+    streams: f64,
 }
 
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
@@ -89,6 +126,8 @@ const FADE_DEPTH_M: f64 = 50.0;
 /// Base heights below which the sea floor has no waves shorter than 100 km, and above which it has
 /// all; on a planet of the Earth's size.
 const ABYSS_M: [f64; 2] = [-4250.0, -3850.0];
+/// Coast octaves that the abyss has.
+const ABYSSAL: usize = 2;
 /// Height from which ground is no beach, on a planet of the Earth's size.
 const BEACH_M: f64 = 12.0;
 /// Noise at the foot of a knoll.
@@ -151,47 +190,49 @@ impl Earthlike {
     pub(super) fn sample(&self, n: DVec3) -> Sample {
         let at_m = n * self.radius_m;
         let shape = self.outline.at(at_m, n);
-        let base_m = self.vertical * (shape.base_m + UPLIFT_M * shape.mountain);
         let (ridges_m, slope) = self.ridged(at_m, &shape);
-        let slope = slope - n * n.dot(slope);
-        let (gullies_m, slope) = self.gullied(at_m, n, (slope, shape.ruggedness));
-        let steep = slope.length_squared();
-        let ground = Ground { height_m: base_m + ridges_m + gullies_m, steep, shape: &shape };
+        let (gullies_m, slope) = self.gullied(at_m, n, (along(n, slope), shape.ruggedness));
+        let height_m = self.base_m(&shape) + ridges_m + gullies_m;
+        let ground = Ground { height_m, steep: slope.length_squared(), shape };
         let (height_m, grain) = self.detailed(at_m, &ground);
-        let layers = self.layers((at_m, n), &Ground { height_m, ..ground }, grain);
+        let climate = self.climate.narrow_values(at_m);
+        let layers = self.layers(n, &Ground { height_m, ..ground }, grain, climate);
         Sample { height_m, layers, ruggedness: shape.ruggedness }
+    }
+
+    /// [`Earthlike::sample`] of many points, bit for bit.
+    pub(super) fn samples(&self, normals: &[DVec3], out: &mut [Sample]) {
+        for (normals, out) in normals.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            block::fill(self, normals, out);
+        }
+    }
+
+    #[inline(always)]
+    fn base_m(&self, shape: &Shape) -> f64 {
+        self.vertical * (shape.base_m + UPLIFT_M * shape.mountain)
     }
 
     /// Height and slope of coasts and mountain ridges.
     fn ridged(&self, at_m: DVec3, shape: &Shape) -> (f64, DVec3) {
-        if shape.mountain <= 0.0 && shape.ruggedness <= UNERODED {
+        if is_quiet(shape) {
             return (self.coasts_m(at_m, shape.base_m), DVec3::ZERO);
         }
-        let (mut height_m, mut slope) = (0.0, DVec3::ZERO);
         let cells = self.ridge_lattices.cells(at_m);
-        let mut crest = 1.0;
+        let mut range = Range::FOOT;
         for (octave, cell) in self.ridges.iter().zip(&cells) {
-            let (value, gradient) = cell.value_and_gradient();
-            let rounded = (value * value + CREST * CREST).sqrt();
-            let ridge = 1.0 - 2.0 * rounded;
-            let amplitude_m = octave.ridge_m * shape.mountain * crest;
-            height_m += octave.coast_m * value + amplitude_m * ridge;
-            let broad = (value * value + STEERING_CREST * STEERING_CREST).sqrt();
-            let per_value_m = octave.coast_m - 2.0 * amplitude_m * value / broad;
-            slope += octave.lattice.per_metre(gradient * per_value_m);
-            crest = (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * crest);
+            range = octave.ridge(&range, shape.mountain, cell.value_and_gradient());
         }
-        (height_m, slope * ramp(UNERODED, UNERODED + 0.03, shape.ruggedness))
+        (range.height_m, range.slope * steering(shape.ruggedness))
     }
 
     /// Height of the same octaves where there are no ridges. The deep sea floor lacks short ones.
     fn coasts_m(&self, at_m: DVec3, base_m: f64) -> f64 {
         let cells = self.ridge_lattices.cells(at_m);
-        let share = ramp(ABYSS_M[0], ABYSS_M[1], base_m);
-        let count = if share > 0.0 { self.ridges.len() } else { 2 };
+        let share = above_abyss(base_m);
+        let count = if share > 0.0 { self.ridges.len() } else { ABYSSAL };
         let mut coast_m = 0.0;
         for (i, (octave, cell)) in self.ridges.iter().zip(&cells).take(count).enumerate() {
-            let share = if i < 2 { 1.0 } else { share };
+            let share = if i < ABYSSAL { 1.0 } else { share };
             coast_m += share * octave.coast_m * cell.narrow_value();
         }
         coast_m
@@ -204,75 +245,87 @@ impl Earthlike {
         // Plains and sea floor have no gullies, which saves a seventh of their time.
         let gullies = if eroded > 0.0 { &self.gullies[..] } else { &[] };
         for octave in gullies {
-            let side = n.cross(slope);
-            let steep = side.length_squared();
-            let inverse = 1.0 / (steep + self.slope_scale * self.slope_scale).sqrt();
-            let (value, change) = octave.lattice.stripes(at_m, side * inverse);
-            let amplitude_m = octave.amplitude_m * eroded * (steep * inverse * inverse);
+            let steering = self.steering(n, slope);
+            let (value, change) = octave.lattice.stripes(at_m, steering.side);
+            let amplitude_m = octave.amplitude_m * eroded * steering.strength;
             height_m += amplitude_m * value;
             slope += change * amplitude_m;
         }
         (height_m, slope)
     }
 
+    /// Where gullies on a slope run.
+    #[inline(always)]
+    fn steering(&self, n: DVec3, slope: DVec3) -> Steering {
+        let side = n.cross(slope);
+        let steep = side.length_squared();
+        let inverse = 1.0 / (steep + self.slope_scale * self.slope_scale).sqrt();
+        Steering { side: side * inverse, strength: steep * inverse * inverse }
+    }
+
     /// The height with all fine detail, and the noise of the shortest wave that matters here.
     fn detailed(&self, at_m: DVec3, ground: &Ground) -> (f64, f64) {
-        let ruggedness = ground.shape.ruggedness;
-        let mut height_m = ground.height_m;
-        let share = ramp(ABYSS_M[0], ABYSS_M[1], ground.shape.base_m);
+        let share = above_abyss(ground.shape.base_m);
+        let mut fine = Fine::on(ground);
         if share <= 0.0 {
-            return (height_m, 0.0);
+            return (fine.height_m, fine.last);
         }
-        let mut local = 0.35 + 0.65 * ground.steep / (ground.steep + 0.06);
-        let (mut swell, mut last) = (0.0, 0.0);
-        let count = self.details.iter().take_while(|four| four.long).count();
-        let (long, short) = self.details.split_at(count);
+        let (long, short) = self.long_and_short();
         for four in long {
             let values = four.lattices.fine_values(at_m);
             for (octave, value) in four.octaves.iter().zip(values) {
-                height_m += share * (octave.fixed_m + octave.rugged_m * ruggedness * local) * value;
-                local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
-                swell = 0.6 * swell + value;
-                last = value;
+                fine = octave.roll(&fine, (share, ground.shape.ruggedness), value);
             }
         }
-        let above_m = height_m.abs();
-        let deep = if height_m < 0.0 { above_m * self.per_depth - 1.0 } else { 0.0 };
-        if deep >= 1.0 {
-            return (height_m, last);
+        if self.deep(fine.height_m) >= 1.0 {
+            return (fine.height_m, fine.last);
         }
-        let seen = share * (1.0 - ramp(0.0, 1.0, deep));
-        // Some plains are flat and some are hummocky; beaches and the water's edge are smooth.
-        let dry = ramp(0.1, 1.0, above_m * self.per_beach);
-        let lively = seen * (0.12 + 0.88 * dry) * (0.3 + 0.7 * ramp(-0.35, 0.4, swell));
-        let rugged = seen * early(ruggedness);
-        // Streams run on gentle ground above the sea; mountains have gullies.
-        let streams = ramp(0.1, 1.0, height_m * self.per_beach) * (1.0 - early(ruggedness));
+        let mood = self.mood(&fine, share, ground.shape.ruggedness);
         for four in short {
             let values = four.lattices.fine_values(at_m);
             for (octave, value) in four.octaves.iter().zip(values) {
-                let amplitude_m = octave.fixed_m * lively + octave.rugged_m * rugged * local;
-                let knoll = (value - KNOLL_FOOT).max(0.0);
-                let bed = (last + MEANDER * value) * PER_BED;
-                let bank = (1.0 - bed * bed).max(0.0);
-                height_m += amplitude_m * value + octave.knoll_m * lively * (knoll * knoll)
-                    - octave.bed_m * streams * (bank * bank);
-                local = (local * (1.0 + 0.5 * value)).clamp(0.25, 1.0);
-                last = value;
+                fine = octave.roughen(&fine, &mood, value);
             }
         }
-        (height_m, last)
+        (fine.height_m, fine.last)
     }
 
-    fn layers(&self, (at_m, n): (DVec3, DVec3), ground: &Ground, grain: f64) -> Layers {
-        let Shape { mountain, ruggedness, .. } = *ground.shape;
+    #[inline(always)]
+    fn long_and_short(&self) -> (&[Details], &[Details]) {
+        let count = self.details.iter().take_while(|four| four.long).count();
+        self.details.split_at(count)
+    }
+
+    /// How far under water a height is: 0 where short details begin to fade, 1 where they end.
+    #[inline(always)]
+    fn deep(&self, height_m: f64) -> f64 {
+        if height_m < 0.0 { height_m.abs() * self.per_depth - 1.0 } else { 0.0 }
+    }
+
+    /// What short details depend on besides their noise.
+    #[inline(always)]
+    fn mood(&self, fine: &Fine, share: f64, ruggedness: f64) -> Mood {
+        let seen = share * (1.0 - ramp(0.0, 1.0, self.deep(fine.height_m)));
+        // Some plains are flat and some are hummocky; beaches and the water's edge are smooth.
+        let dry = ramp(0.1, 1.0, fine.height_m.abs() * self.per_beach);
+        Mood {
+            lively: seen * (0.12 + 0.88 * dry) * (0.3 + 0.7 * ramp(-0.35, 0.4, fine.swell)),
+            rugged: seen * early(ruggedness),
+            // Streams run on gentle ground above the sea; mountains have gullies.
+            streams: ramp(0.1, 1.0, fine.height_m * self.per_beach) * (1.0 - early(ruggedness)),
+        }
+    }
+
+    #[inline(always)]
+    fn layers(&self, n: DVec3, ground: &Ground, grain: f64, climate: [f64; 3]) -> Layers {
+        let Shape { mountain, ruggedness, .. } = ground.shape;
         let height_m = ground.height_m;
         let steep = ground.steep / (ground.steep + 0.16);
         // Steps of moisture and temperature would draw contour lines; grain breaks them up.
         let grain = grain * 1000.0;
         let dither = (grain - round(grain)) / 255.0;
         let above_m = height_m.max(0.0) / self.vertical.max(1e-9);
-        let [weather, wide, narrow] = self.climate.narrow_values(at_m);
+        let [weather, wide, narrow] = climate;
         // Sine of latitude squared: warm to 30 degrees, steep in the westerlies, cold caps.
         let north = n.z * n.z;
         let polar = north * north * north * north;
@@ -345,6 +398,64 @@ impl Earthlike {
         let valley_m = shore_m - coasts_m - valleys_m - gullies_m - details_m(1.0) - beds_m;
         let peak_m = inland_m + UPLIFT_M * self.vertical + crests_m + gullies_m + details_m(1.0);
         [sea_m.min(valley_m), peak_m]
+    }
+}
+
+/// Whether there is neither ridge nor gully.
+#[inline(always)]
+fn is_quiet(shape: &Shape) -> bool {
+    shape.mountain <= 0.0 && shape.ruggedness <= UNERODED
+}
+
+/// The part of a slope along the surface.
+#[inline(always)]
+fn along(n: DVec3, slope: DVec3) -> DVec3 {
+    slope - n * n.dot(slope)
+}
+
+/// How much of the ridges' slope steers gullies.
+#[inline(always)]
+fn steering(ruggedness: f64) -> f64 {
+    ramp(UNERODED, UNERODED + 0.03, ruggedness)
+}
+
+/// 0 on the deep sea floor, 1 from its foot on.
+#[inline(always)]
+fn above_abyss(base_m: f64) -> f64 {
+    ramp(ABYSS_M[0], ABYSS_M[1], base_m)
+}
+
+impl Range {
+    const FOOT: Range = Range { height_m: 0.0, slope: DVec3::ZERO, crest: 1.0 };
+}
+
+impl Ridge {
+    /// Adds this octave, of which noise and gradient are given.
+    #[inline(always)]
+    fn ridge(&self, range: &Range, mountain: f64, (value, gradient): (f64, DVec3)) -> Range {
+        let rounded = (value * value + CREST * CREST).sqrt();
+        let ridge = 1.0 - 2.0 * rounded;
+        let amplitude_m = self.ridge_m * mountain * range.crest;
+        let broad = (value * value + STEERING_CREST * STEERING_CREST).sqrt();
+        let per_value_m = self.coast_m - 2.0 * amplitude_m * value / broad;
+        Range {
+            height_m: range.height_m + (self.coast_m * value + amplitude_m * ridge),
+            slope: range.slope + self.lattice.per_metre(gradient * per_value_m),
+            crest: (0.45 + 0.55 * ridge).clamp(0.0, 1.0) * (0.3 + 0.7 * range.crest),
+        }
+    }
+}
+
+impl Fine {
+    #[inline(always)]
+    fn on(ground: &Ground) -> Fine {
+        let local = 0.35 + 0.65 * ground.steep / (ground.steep + 0.06);
+        Fine { height_m: ground.height_m, local, swell: 0.0, last: 0.0 }
+    }
+
+    #[inline(always)]
+    fn next_local(&self, value: f64) -> f64 {
+        (self.local * (1.0 + 0.5 * value)).clamp(0.25, 1.0)
     }
 }
 
@@ -422,6 +533,35 @@ impl Detail {
             rugged_m: per_m * scale,
             knoll_m: if between(40.0, LONG_M) { 0.08 * scale } else { 0.0 },
             bed_m: if between(60.0, LONG_M) { 0.010 * scale } else { 0.0 },
+        }
+    }
+
+    /// Adds this octave, a long one, of which the noise is given.
+    #[inline(always)]
+    fn roll(&self, fine: &Fine, (share, ruggedness): (f64, f64), value: f64) -> Fine {
+        let amplitude_m = self.fixed_m + self.rugged_m * ruggedness * fine.local;
+        Fine {
+            height_m: fine.height_m + share * amplitude_m * value,
+            local: fine.next_local(value),
+            swell: 0.6 * fine.swell + value,
+            last: value,
+        }
+    }
+
+    /// Adds this octave, a short one, of which the noise is given.
+    #[inline(always)]
+    fn roughen(&self, fine: &Fine, mood: &Mood, value: f64) -> Fine {
+        let amplitude_m = self.fixed_m * mood.lively + self.rugged_m * mood.rugged * fine.local;
+        let knoll = (value - KNOLL_FOOT).max(0.0);
+        let bed = (fine.last + MEANDER * value) * PER_BED;
+        let bank = (1.0 - bed * bed).max(0.0);
+        let added_m = amplitude_m * value + self.knoll_m * mood.lively * (knoll * knoll)
+            - self.bed_m * mood.streams * (bank * bank);
+        Fine {
+            height_m: fine.height_m + added_m,
+            local: fine.next_local(value),
+            swell: fine.swell,
+            last: value,
         }
     }
 

@@ -22,6 +22,8 @@ pub(super) const PEAK: f64 = 0.75;
 const SCALE: f64 = 75.5;
 const SIXTH: f64 = 1.0 / 6.0;
 const SIXTH32: f32 = 1.0 / 6.0;
+const THIRD: f64 = 2.0 * SIXTH;
+const THIRD32: f32 = 2.0 * SIXTH32;
 
 /// Half of the gradients; their covariance is a third of the identity, so no axis is favoured.
 const HALF_GRADIENTS: [[f64; 3]; 16] = [
@@ -129,6 +131,17 @@ impl<const N: usize> Lattices<N> {
         cells
     }
 
+    /// The cell of one lattice around a point.
+    #[inline(always)]
+    pub(super) fn cell(&self, k: usize, at_m: DVec3) -> Cell {
+        let mut at = [0.0; 3];
+        for (axis, (rows, offset)) in self.rows.iter().zip(&self.offset).enumerate() {
+            let along = rows[0][k] * at_m.x + rows[1][k] * at_m.y + rows[2][k] * at_m.z;
+            at[axis] = along + offset[k];
+        }
+        cell(at, self.seed[k])
+    }
+
     /// [`Cell::fine_value`] of every lattice at a point.
     #[inline(always)]
     pub(super) fn fine_values(&self, at_m: DVec3) -> [f64; N] {
@@ -155,43 +168,46 @@ impl<const N: usize> Lattices<N> {
 /// One of the six simplices of a cell: what to add to a point's offset to see it from each corner,
 /// and what the corners' hashes add.
 #[derive(Clone, Copy)]
-struct Simplex {
+pub(super) struct Simplex {
     offsets: [[f64; 4]; 3],
     narrow: [[f32; 4]; 3],
     steps: [u64; 4],
 }
 
 /// By which of x >= y, y >= z and x >= z hold, as bits 0 to 2. Two of the eight cannot happen.
-static SIMPLICES: [Simplex; 8] = simplices();
-
-const fn simplices() -> [Simplex; 8] {
-    let empty = Simplex { offsets: [[0.0; 4]; 3], narrow: [[0.0; 4]; 3], steps: [0; 4] };
-    let mut all = [empty; 8];
+static SIMPLICES: [Simplex; 8] = {
+    let mut all = [simplex(0); 8];
     let mut order = 0;
     while order < 8 {
-        let (xy, yz, xz) = (order & 1 != 0, order & 2 != 0, order & 4 != 0);
-        // Which coordinates are largest and which are not smallest orders the inner corners.
-        let first = [xy & xz, !xy & yz, !yz & !xz];
-        let second = [xy | xz, !xy | yz, !(yz & xz)];
-        let primes = [PRIME_X, PRIME_Y, PRIME_Z];
-        let simplex = &mut all[order];
-        let mut axis = 0;
-        while axis < 3 {
-            let (i, j) = (first[axis] as u8, second[axis] as u8);
-            let (i32, j32) = (i as f32, j as f32);
-            let (i, j) = (i as f64, j as f64);
-            simplex.offsets[axis] = [0.0, SIXTH - i, 2.0 * SIXTH - j, -0.5];
-            simplex.narrow[axis] = [0.0, SIXTH32 - i32, 2.0 * SIXTH32 - j32, -0.5];
-            let prime = primes[axis];
-            let one = if first[axis] { prime } else { 0 };
-            let two = if second[axis] { prime } else { 0 };
-            let [a, b, c, d] = simplex.steps;
-            simplex.steps = [a, b.wrapping_add(one), c.wrapping_add(two), d.wrapping_add(prime)];
-            axis += 1;
-        }
+        all[order] = simplex(order);
         order += 1;
     }
     all
+};
+
+/// Made out of nothing but choices, so that many at once need no table.
+#[inline(always)]
+const fn simplex(order: usize) -> Simplex {
+    let (xy, yz, xz) = (order & 1 != 0, order & 2 != 0, order & 4 != 0);
+    // Which coordinates are largest and which are not smallest orders the inner corners.
+    let first = [xy & xz, !xy & yz, !yz & !xz];
+    let second = [xy | xz, !xy | yz, !(yz & xz)];
+    let primes = [PRIME_X, PRIME_Y, PRIME_Z];
+    let mut simplex = Simplex { offsets: [[0.0; 4]; 3], narrow: [[0.0; 4]; 3], steps: [0; 4] };
+    let mut axis = 0;
+    while axis < 3 {
+        let (one, two, prime) = (first[axis], second[axis], primes[axis]);
+        let wide = [if one { SIXTH - 1.0 } else { SIXTH }, if two { THIRD - 1.0 } else { THIRD }];
+        let thin =
+            [if one { SIXTH32 - 1.0 } else { SIXTH32 }, if two { THIRD32 - 1.0 } else { THIRD32 }];
+        simplex.offsets[axis] = [0.0, wide[0], wide[1], -0.5];
+        simplex.narrow[axis] = [0.0, thin[0], thin[1], -0.5];
+        let (one, two) = (if one { prime } else { 0 }, if two { prime } else { 0 });
+        let [a, b, c, d] = simplex.steps;
+        simplex.steps = [a, b.wrapping_add(one), c.wrapping_add(two), d.wrapping_add(prime)];
+        axis += 1;
+    }
+    simplex
 }
 
 impl Lattice {
@@ -239,7 +255,14 @@ impl Lattice {
     /// per blot. Random phases sit on the lattice, so stripes fork and join.
     #[inline(always)]
     pub(super) fn stripes(&self, at_m: DVec3, side: DVec3) -> (f64, DVec3) {
-        let c = self.cell(at_m).corners();
+        let cell = self.cell(at_m);
+        self.stripes_in(&cell, cell.looked_up(), side)
+    }
+
+    /// [`Lattice::stripes`] in a cell and its simplex.
+    #[inline(always)]
+    pub(super) fn stripes_in(&self, cell: &Cell, simplex: &Simplex, side: DVec3) -> (f64, DVec3) {
+        let c = cell.corners(simplex);
         let across =
             DVec3::new(self.rows[0].dot(side), self.rows[1].dot(side), self.rows[2].dot(side));
         let turns_per_offset = TURNS_PER_CELL / self.cells_per_m;
@@ -259,7 +282,7 @@ impl Lattice {
     }
 
     /// A gradient per metre, from one in the lattice's own units.
-    #[inline]
+    #[inline(always)]
     pub(super) fn per_metre(&self, slope: DVec3) -> DVec3 {
         self.rows[0] * slope.x + self.rows[1] * slope.y + self.rows[2] * slope.z
     }
@@ -276,7 +299,13 @@ impl Cell {
     /// Noise at the cell's point; see [`Lattice::value`].
     #[inline(always)]
     pub(super) fn value(&self) -> f64 {
-        let c = self.corners();
+        self.value_in(self.looked_up())
+    }
+
+    /// [`Cell::value`] in the cell's simplex.
+    #[inline(always)]
+    pub(super) fn value_in(&self, simplex: &Simplex) -> f64 {
+        let c = self.corners(simplex);
         let mut sum = 0.0;
         for i in 0..4 {
             let g = gradient(c.hash[i]);
@@ -290,7 +319,13 @@ impl Cell {
     /// [`Cell::value`] and its gradient in the lattice's own units.
     #[inline(always)]
     pub(super) fn value_and_gradient(&self) -> (f64, DVec3) {
-        let c = self.corners();
+        self.value_and_gradient_in(self.looked_up())
+    }
+
+    /// [`Cell::value_and_gradient`] in the cell's simplex.
+    #[inline(always)]
+    pub(super) fn value_and_gradient_in(&self, simplex: &Simplex) -> (f64, DVec3) {
+        let c = self.corners(simplex);
         let mut sum = 0.0;
         let mut slope = DVec3::ZERO;
         for i in 0..4 {
@@ -311,18 +346,41 @@ impl Cell {
     /// [`Cell::value`] within 1e-6, where that does not matter: f32, four corners at a time.
     #[inline(always)]
     pub(super) fn narrow_value(&self) -> f64 {
-        self.narrow_with(mix)
+        self.narrow_value_in(self.looked_up())
+    }
+
+    /// [`Cell::narrow_value`] in the cell's simplex.
+    #[inline(always)]
+    pub(super) fn narrow_value_in(&self, simplex: &Simplex) -> f64 {
+        self.narrow_with(simplex, mix)
     }
 
     /// As precise and faster, but another noise of the same kind.
     #[inline(always)]
     pub(super) fn fine_value(&self) -> f64 {
-        self.narrow_with(half_mix)
+        self.fine_value_in(self.looked_up())
+    }
+
+    /// [`Cell::fine_value`] in the cell's simplex.
+    #[inline(always)]
+    pub(super) fn fine_value_in(&self, simplex: &Simplex) -> f64 {
+        self.narrow_with(simplex, half_mix)
+    }
+
+    /// The simplex that holds the point, from a table: the faster way for one point.
+    #[inline(always)]
+    fn looked_up(&self) -> &'static Simplex {
+        &SIMPLICES[self.order]
+    }
+
+    /// The same, made anew: the faster way for many points at once.
+    #[inline(always)]
+    pub(super) fn simplex(&self) -> Simplex {
+        simplex(self.order)
     }
 
     #[inline(always)]
-    fn narrow_with(&self, scramble: impl Fn(u64) -> u64) -> f64 {
-        let simplex = &SIMPLICES[self.order];
+    fn narrow_with(&self, simplex: &Simplex, scramble: impl Fn(u64) -> u64) -> f64 {
         let [ox, oy, oz] = &simplex.narrow;
         let [x, y, z] = self.at.map(narrow);
         let slots = simplex.steps.map(|step| slot(scramble(self.base.wrapping_add(step))));
@@ -339,9 +397,8 @@ impl Cell {
     }
 
     #[inline(always)]
-    fn corners(&self) -> Corners {
+    fn corners(&self, simplex: &Simplex) -> Corners {
         let [x, y, z] = self.at;
-        let simplex = &SIMPLICES[self.order];
         let [ox, oy, oz] = &simplex.offsets;
         Corners {
             dx: ox.map(|o| x + o),
@@ -355,8 +412,7 @@ impl Cell {
 /// The cell around a point in a lattice's own units.
 #[inline(always)]
 fn cell([x, y, z]: [f64; 3], seed: u64) -> Cell {
-    const THIRD: f64 = 1.0 / 3.0;
-    let skew = (x + y + z) * THIRD - 0.5;
+    let skew = (x + y + z) * (1.0 / 3.0) - 0.5;
     let (bx, by, bz) = (x + skew + ROUND, y + skew + ROUND, z + skew + ROUND);
     let (fx, fy, fz) = (bx - ROUND, by - ROUND, bz - ROUND);
     let unskew = (fx + fy + fz) * SIXTH;
@@ -375,61 +431,61 @@ fn cell([x, y, z]: [f64; 3], seed: u64) -> Cell {
 const TURNS_PER_CELL: f64 = 1.0;
 
 /// Scrambles 64 bits (the finaliser of splitmix64, shortened by one shift).
-#[inline]
+#[inline(always)]
 pub(super) fn mix(bits: u64) -> u64 {
     let a = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     (a ^ (a >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB)
 }
 
 /// Scrambles the top bits well enough to pick a gradient.
-#[inline]
+#[inline(always)]
 fn half_mix(bits: u64) -> u64 {
     (bits ^ (bits >> 32)).wrapping_mul(0xBF58_476D_1CE4_E5B9)
 }
 
 /// The top 52 bits of a hash as a number in 0..1.
-#[inline]
+#[inline(always)]
 pub(super) fn unit(hash: u64) -> f64 {
     f64::from_bits((hash >> 12) | 0x3FF0_0000_0000_0000) - 1.0
 }
 
 /// Nearest integer, ties to even.
-#[inline]
+#[inline(always)]
 pub(super) fn round(x: f64) -> f64 {
     (x + ROUND) - ROUND
 }
 
 /// 0 up to `low`, 1 from `high`, a cubic with level ends between.
-#[inline]
+#[inline(always)]
 pub(super) fn ramp(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-#[inline]
+#[inline(always)]
 fn gradient(hash: u64) -> &'static [f64; 4] {
     &GRADIENTS[slot(hash)]
 }
 
-#[inline]
+#[inline(always)]
 fn slot(hash: u64) -> usize {
     (hash >> 59) as usize
 }
 
-#[inline]
+#[inline(always)]
 fn kernel(c: &Corners, i: usize) -> f64 {
     let t = 0.5 - c.dx[i] * c.dx[i] - c.dy[i] * c.dy[i] - c.dz[i] * c.dz[i];
     if t > 0.0 { t } else { 0.0 }
 }
 
 /// Parabolas in place of the sine of `turns` full turns; off by 0.06 at most, slopes continuous.
-#[inline]
+#[inline(always)]
 fn sine(turns: f64) -> f64 {
     let u = turns - round(turns);
     8.0 * u - 16.0 * u * u.abs()
 }
 
-#[inline]
+#[inline(always)]
 fn cosine(turns: f64) -> f64 {
     sine(turns + 0.25)
 }

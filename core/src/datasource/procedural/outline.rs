@@ -7,9 +7,11 @@
 
 use glam::DVec3;
 
+use super::lanes::{BLOCK, Chosen, Column, Vectors, ZEROS, lanes, narrow_values, values};
 use super::noise::{Cell, Lattice, Lattices, mix, ramp, unit};
 
 /// The longest waves at one point.
+#[derive(Clone, Copy)]
 pub(super) struct Shape {
     /// Height before mountains and coast detail, metres on a planet of the Earth's size.
     pub base_m: f64,
@@ -17,6 +19,35 @@ pub(super) struct Shape {
     pub mountain: f64,
     /// 0..1 and never below `mountain`.
     pub ruggedness: f64,
+}
+
+/// The shapes of a block of points.
+pub(super) struct Shapes {
+    pub base_m: Column,
+    pub mountain: Column,
+    pub ruggedness: Column,
+}
+
+/// Noise that makes a shape.
+struct Waves {
+    continents: f64,
+    wiggle: f64,
+    breaks: f64,
+    young: f64,
+}
+
+impl Shapes {
+    #[inline(always)]
+    pub(super) fn at(&self, i: usize) -> Shape {
+        Shape { base_m: self.base_m[i], mountain: self.mountain[i], ruggedness: self.ruggedness[i] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, shape: Shape) {
+        self.base_m[i] = shape.base_m;
+        self.mountain[i] = shape.mountain;
+        self.ruggedness[i] = shape.ruggedness;
+    }
 }
 
 /// Continents, basins and belts.
@@ -69,18 +100,76 @@ impl Outline {
     pub(super) fn at(&self, at_m: DVec3, n: DVec3) -> Shape {
         let warped_m = self.warped(at_m, n);
         let lands = self.lands.cells(warped_m);
-        let inland = (continent(&lands) - self.coast) / self.spread;
         let [wiggle, breaks, uplands] = self.marks.cells(at_m);
-        let (wiggle, breaks) = (0.16 * wiggle.value(), breaks.value());
-        let land = ramp(-0.03, 0.10, inland);
+        let waves = Waves {
+            continents: continent(&lands),
+            wiggle: wiggle.value(),
+            breaks: breaks.value(),
+            young: lands[4].value(),
+        };
+        self.shape(&waves, || lands[5].value(), || uplands.narrow_value())
+    }
+
+    /// [`Outline::at`] of a block of points.
+    #[inline(always)]
+    pub(super) fn shapes(&self, at_m: &Vectors, n: &Vectors, count: usize) -> Shapes {
+        let warped_m = self.warped_all(at_m, n, count);
+        let mut continents = ZEROS;
+        for (k, weight) in CONTINENTS.into_iter().enumerate() {
+            let values = values((&self.lands, k), &warped_m, count);
+            for i in lanes(count) {
+                continents[i] += weight * values[i];
+            }
+        }
+        let wiggle = values((&self.marks, 0), at_m, count);
+        let breaks = values((&self.marks, 1), at_m, count);
+        let young = values((&self.lands, 4), &warped_m, count);
+        let (mut is_land, mut has_old) = ([false; BLOCK], [false; BLOCK]);
+        for i in lanes(count) {
+            let land = land(self.inland(continents[i]));
+            is_land[i] = land > 0.0;
+            has_old[i] = old_share(land, breaks[i]) > 0.0;
+        }
+        let (mut old, mut uplands) = (ZEROS, ZEROS);
+        let chosen = Chosen::of(count, &has_old);
+        let picked_m = chosen.pick_vectors(&warped_m);
+        chosen.put(&values((&self.lands, 5), &picked_m, chosen.count()), &mut old);
+        let chosen = Chosen::of(count, &is_land);
+        let picked_m = chosen.pick_vectors(at_m);
+        chosen.put(&narrow_values((&self.marks, 2), &picked_m, chosen.count()), &mut uplands);
+        let mut shapes = Shapes { base_m: ZEROS, mountain: ZEROS, ruggedness: ZEROS };
+        for i in lanes(count) {
+            let (old, uplands) = (old[i], uplands[i]);
+            let waves = Waves {
+                continents: continents[i],
+                wiggle: wiggle[i],
+                breaks: breaks[i],
+                young: young[i],
+            };
+            shapes.set(i, self.shape(&waves, || old, || uplands));
+        }
+        shapes
+    }
+
+    /// The shape that these waves make; `old` and `uplands` are looked at only where they matter.
+    #[inline(always)]
+    fn shape(
+        &self,
+        waves: &Waves,
+        old: impl FnOnce() -> f64,
+        uplands: impl FnOnce() -> f64,
+    ) -> Shape {
+        let inland = self.inland(waves.continents);
+        let (wiggle, breaks) = (0.16 * waves.wiggle, waves.breaks);
+        let land = land(inland);
         // What would be multiplied by zero is left out: most of the planet lies under water.
         let share = 0.35 + 0.65 * ramp(-0.35, 0.15, breaks);
-        let young = share * belt(lands[4].value() + wiggle, 0.12 + 0.06 * breaks);
-        let share = if land > 0.0 { ramp(0.25, -0.35, breaks) } else { 0.0 };
-        let old = if share > 0.0 { share * belt(lands[5].value() + wiggle, 0.09) } else { 0.0 };
+        let young = share * belt(waves.young + wiggle, 0.12 + 0.06 * breaks);
+        let share = old_share(land, breaks);
+        let old = if share > 0.0 { share * belt(old() + wiggle, 0.09) } else { 0.0 };
         let belts = 1.0 - (1.0 - young) * (1.0 - 0.5 * old);
         let mountain = belts * land;
-        let upland = if land > 0.0 { ramp(0.0, 0.6, uplands.narrow_value()) } else { 0.0 };
+        let upland = if land > 0.0 { ramp(0.0, 0.6, uplands()) } else { 0.0 };
         let plain = 0.03 + land * (0.03 + 0.16 * upland);
         let rise = young * (1.0 - land);
         let ruggedness = plain + (1.0 - plain) * mountain + 0.12 * rise;
@@ -92,12 +181,32 @@ impl Outline {
         Shape { base_m, mountain, ruggedness }
     }
 
+    /// How far inside the land a point is, in units that are alike on all planets.
+    #[inline(always)]
+    fn inland(&self, continents: f64) -> f64 {
+        (continents - self.coast) / self.spread
+    }
+
     /// Swirls along the surface bend coasts and belts out of the roundness of plain noise.
     fn warped(&self, at_m: DVec3, n: DVec3) -> DVec3 {
         let mut warped_m = at_m;
         for (lattice, reach_m2) in &self.warps {
             let (_, gradient) = lattice.value_and_gradient(warped_m);
-            warped_m += (n.cross(gradient) + gradient * 0.5) * *reach_m2;
+            warped_m += swirl(n, gradient) * *reach_m2;
+        }
+        warped_m
+    }
+
+    #[inline(always)]
+    fn warped_all(&self, at_m: &Vectors, n: &Vectors, count: usize) -> Vectors {
+        let mut warped_m = *at_m;
+        for (lattice, reach_m2) in &self.warps {
+            for i in lanes(count) {
+                let cell = lattice.cell(warped_m.at(i));
+                let (_, slope) = cell.value_and_gradient_in(&cell.simplex());
+                let swirl = swirl(n.at(i), lattice.per_metre(slope));
+                warped_m.set(i, warped_m.at(i) + swirl * *reach_m2);
+            }
         }
         warped_m
     }
@@ -131,7 +240,25 @@ fn continent(lands: &[Cell; 6]) -> f64 {
     sum
 }
 
+#[inline(always)]
+fn swirl(n: DVec3, gradient: DVec3) -> DVec3 {
+    n.cross(gradient) + gradient * 0.5
+}
+
+/// 0 in the sea, 1 on land.
+#[inline(always)]
+fn land(inland: f64) -> f64 {
+    ramp(-0.03, 0.10, inland)
+}
+
+/// How much of the old belts is left.
+#[inline(always)]
+fn old_share(land: f64, breaks: f64) -> f64 {
+    if land > 0.0 { ramp(0.25, -0.35, breaks) } else { 0.0 }
+}
+
 /// A belt follows a zero of noise: 1 on it, 0 from `width` on, level at both.
+#[inline(always)]
 fn belt(noise: f64, width: f64) -> f64 {
     let off = noise / width;
     let inside = 1.0 - off * off;

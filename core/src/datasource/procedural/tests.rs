@@ -16,7 +16,7 @@ const SMALL_M: f64 = 1000.0;
 /// Edges in parts of the radius; from 100 km to 0.2 m on the Earth, and the whole body.
 const SCALES: [f64; 10] = [0.3, 0.05, 1.6e-2, 3e-3, 6e-4, 1e-4, 1e-5, 1e-6, 2e-7, 3e-8];
 
-struct Dice(u64);
+pub(super) struct Dice(pub u64);
 
 impl Dice {
     fn unit(&mut self) -> f64 {
@@ -24,7 +24,7 @@ impl Dice {
         unit(self.0)
     }
 
-    fn direction(&mut self) -> DVec3 {
+    pub(super) fn direction(&mut self) -> DVec3 {
         loop {
             let v = DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - DVec3::ONE;
             if (0.01..=1.0).contains(&v.length_squared()) {
@@ -34,7 +34,7 @@ impl Dice {
     }
 }
 
-fn planet(style: Style, radius_m: f64, seed: u64) -> Planet {
+pub(super) fn planet(style: Style, radius_m: f64, seed: u64) -> Planet {
     Planet::new(&ProceduralSettings { seed, radius_m, style, relief: 1.0, finest_m: 0.15 })
 }
 
