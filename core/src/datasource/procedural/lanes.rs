@@ -8,6 +8,10 @@
 //! Every loop here runs over lanes, which do not know of each other, and calls what one point calls
 //! too. So the compiler makes vectors of them, as wide as the machine has. Everything is inlined
 //! into the one function that is compiled for several machines.
+#![expect(
+    clippy::needless_range_loop,
+    reason = "iterators count with checks, and loops with checks are not made into vectors"
+)]
 
 use glam::DVec3;
 
@@ -57,12 +61,12 @@ pub(super) struct Chosen {
 impl Chosen {
     /// Those of the first `count` lanes that are wanted.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "a block has fewer than 256 points")]
+    #[expect(clippy::cast_possible_truncation, reason = "lanes are fewer than 256")]
     pub(super) fn of(count: usize, wanted: &[bool; BLOCK]) -> Chosen {
         let mut chosen = Chosen { lanes: [0; BLOCK], count: 0, of: count.min(BLOCK) };
-        for (i, &is_wanted) in wanted.iter().enumerate().take(chosen.of) {
+        for i in 0..chosen.of {
             chosen.lanes[chosen.count.min(BLOCK - 1)] = i as u8;
-            chosen.count += usize::from(is_wanted);
+            chosen.count += usize::from(wanted[i]);
         }
         chosen
     }
@@ -118,7 +122,7 @@ impl Chosen {
 /// The lanes of so many points, and what fills up the last vector.
 #[inline(always)]
 pub(super) fn lanes(count: usize) -> core::ops::Range<usize> {
-    0..count.min(BLOCK).div_ceil(WIDTH) * WIDTH
+    0..(count.min(BLOCK).wrapping_add(WIDTH - 1) & !(WIDTH - 1)).min(BLOCK)
 }
 
 /// [`super::noise::Cell::value`] of the `k`-th lattice.

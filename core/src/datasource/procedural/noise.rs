@@ -134,11 +134,11 @@ impl<const N: usize> Lattices<N> {
     /// The cell of one lattice around a point.
     #[inline(always)]
     pub(super) fn cell(&self, k: usize, at_m: DVec3) -> Cell {
-        let mut at = [0.0; 3];
-        for (axis, (rows, offset)) in self.rows.iter().zip(&self.offset).enumerate() {
-            let along = rows[0][k] * at_m.x + rows[1][k] * at_m.y + rows[2][k] * at_m.z;
-            at[axis] = along + offset[k];
-        }
+        let along = |rows: &[[f64; N]; 3], offset: &[f64; N]| {
+            rows[0][k] * at_m.x + rows[1][k] * at_m.y + rows[2][k] * at_m.z + offset[k]
+        };
+        let ([x, y, z], [dx, dy, dz]) = (&self.rows, &self.offset);
+        let at = [along(x, dx), along(y, dy), along(z, dz)];
         cell(at, self.seed[k])
     }
 
@@ -185,29 +185,39 @@ static SIMPLICES: [Simplex; 8] = {
     all
 };
 
-/// Made out of nothing but choices, so that many at once need no table.
+/// Made out of nothing but choices, so that many at once need no table; and without loops, whose
+/// checked counters would keep the compiler from making vectors of them.
 #[inline(always)]
 const fn simplex(order: usize) -> Simplex {
     let (xy, yz, xz) = (order & 1 != 0, order & 2 != 0, order & 4 != 0);
     // Which coordinates are largest and which are not smallest orders the inner corners.
-    let first = [xy & xz, !xy & yz, !yz & !xz];
-    let second = [xy | xz, !xy | yz, !(yz & xz)];
-    let primes = [PRIME_X, PRIME_Y, PRIME_Z];
-    let mut simplex = Simplex { offsets: [[0.0; 4]; 3], narrow: [[0.0; 4]; 3], steps: [0; 4] };
-    let mut axis = 0;
-    while axis < 3 {
-        let (one, two, prime) = (first[axis], second[axis], primes[axis]);
-        let wide = [if one { SIXTH - 1.0 } else { SIXTH }, if two { THIRD - 1.0 } else { THIRD }];
-        let thin =
-            [if one { SIXTH32 - 1.0 } else { SIXTH32 }, if two { THIRD32 - 1.0 } else { THIRD32 }];
-        simplex.offsets[axis] = [0.0, wide[0], wide[1], -0.5];
-        simplex.narrow[axis] = [0.0, thin[0], thin[1], -0.5];
-        let (one, two) = (if one { prime } else { 0 }, if two { prime } else { 0 });
-        let [a, b, c, d] = simplex.steps;
-        simplex.steps = [a, b.wrapping_add(one), c.wrapping_add(two), d.wrapping_add(prime)];
-        axis += 1;
+    let [x1, y1, z1] = [xy & xz, !xy & yz, !yz & !xz];
+    let [x2, y2, z2] = [xy | xz, !xy | yz, !(yz & xz)];
+    let one = step(x1, PRIME_X).wrapping_add(step(y1, PRIME_Y)).wrapping_add(step(z1, PRIME_Z));
+    let two = step(x2, PRIME_X).wrapping_add(step(y2, PRIME_Y)).wrapping_add(step(z2, PRIME_Z));
+    let all = PRIME_X.wrapping_add(PRIME_Y).wrapping_add(PRIME_Z);
+    Simplex {
+        offsets: [offsets(x1, x2), offsets(y1, y2), offsets(z1, z2)],
+        narrow: [narrow_offsets(x1, x2), narrow_offsets(y1, y2), narrow_offsets(z1, z2)],
+        steps: [0, one, two, all],
     }
-    simplex
+}
+
+#[inline(always)]
+const fn step(along: bool, prime: u64) -> u64 {
+    if along { prime } else { 0 }
+}
+
+#[inline(always)]
+const fn offsets(one: bool, two: bool) -> [f64; 4] {
+    let one = if one { SIXTH - 1.0 } else { SIXTH };
+    [0.0, one, if two { THIRD - 1.0 } else { THIRD }, -0.5]
+}
+
+#[inline(always)]
+const fn narrow_offsets(one: bool, two: bool) -> [f32; 4] {
+    let one = if one { SIXTH32 - 1.0 } else { SIXTH32 };
+    [0.0, one, if two { THIRD32 - 1.0 } else { THIRD32 }, -0.5]
 }
 
 impl Lattice {
