@@ -171,7 +171,7 @@ fn a_recording_is_never_written_over_what_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     let fixes = (0..12).map(|s| format!("B1200{s:02}46{:02}000N00800000EA0200002000\n", s));
-    let igc = format!("AXXX001\nHFDTE010620\n{}", fixes.collect::<String>());
+    let igc = format!("AXCS001\nHFDTE010620\n{}", fixes.collect::<String>());
     let (flight, map) = (path("two.igc"), path("two.igc.columns.ron"));
     std::fs::write(&flight, &igc).unwrap();
     std::fs::write(&map, "Columns(time: (column: 1), latitude: 2, longitude: 3)").unwrap();
