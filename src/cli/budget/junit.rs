@@ -7,7 +7,7 @@
 //!
 //! What nobody knows is `skipped` with its reason: JUnit has no third answer. Warnings pass; what
 //! they and all other lines have to say stands in the suite's `system-out`. There are two schemas,
-//! Jenkins' and that of Ant's reports: the file is valid by both, so the root has no attributes,
+//! Jenkins' and that of Ant's reports: the file is meant for both, so the root has no attributes,
 //! the suite has all, and a case holds what went wrong or nothing.
 
 use super::reports::Report;
