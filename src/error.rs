@@ -7,10 +7,12 @@
 
 use crate::core::camera::ViewFault;
 use crate::jobs::{StagePanic, StartError};
+use crate::record::RecordError;
 use crate::render_vk::DrawError;
 use crate::replay::BUNDLED;
 use crate::sources::SourceError;
 use std::fmt;
+use std::io;
 
 /// Why a scene cannot be opened.
 #[derive(Debug)]
@@ -19,6 +21,8 @@ pub enum OpenError {
     Source(SourceError),
     /// The workers cannot be started.
     Workers(StartError),
+    /// The system refused a thread of the loader.
+    Loader(io::Error),
 }
 
 impl fmt::Display for OpenError {
@@ -26,6 +30,7 @@ impl fmt::Display for OpenError {
         match self {
             Self::Source(error) => error.fmt(f),
             Self::Workers(error) => error.fmt(f),
+            Self::Loader(_) => f.write_str("a thread that loads pages could not be started"),
         }
     }
 }
@@ -35,6 +40,49 @@ impl std::error::Error for OpenError {
         match self {
             Self::Source(error) => error.source(),
             Self::Workers(error) => error.source(),
+            Self::Loader(error) => Some(error),
+        }
+    }
+}
+
+/// Why a running scene cannot become another.
+#[derive(Debug)]
+pub enum ChangeError {
+    /// A setting that stays as long as the scene runs.
+    Fixed {
+        /// Which.
+        setting: &'static str,
+    },
+    /// An archive cannot be used.
+    Source(SourceError),
+    /// The system refused a thread of the loader.
+    Loader(io::Error),
+    /// The change cannot be recorded.
+    Record(RecordError),
+}
+
+impl fmt::Display for ChangeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fixed { setting } => write!(
+                f,
+                "scene: {setting} cannot change while the scene runs, allowed are sources, sea, \
+                 sun and views: open another one"
+            ),
+            Self::Source(error) => error.fmt(f),
+            Self::Loader(_) => f.write_str("a thread that loads pages could not be started"),
+            Self::Record(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for ChangeError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Fixed { .. } => None,
+            Self::Source(error) => Some(error),
+            Self::Loader(error) => Some(error),
+            Self::Record(error) => Some(error),
         }
     }
 }
@@ -77,6 +125,10 @@ pub enum FrameError {
     Stage(StagePanic),
     /// Vulkan failed; the terrain is not touched by that.
     Draw(DrawError),
+    /// The scene cannot become another; the state is as it was.
+    Scene(ChangeError),
+    /// The frame was run, but could not be recorded.
+    Record(RecordError),
 }
 
 impl fmt::Display for FrameError {
@@ -85,6 +137,8 @@ impl fmt::Display for FrameError {
             Self::View(fault) => fault.fmt(f),
             Self::Stage(panic) => panic.fmt(f),
             Self::Draw(error) => error.fmt(f),
+            Self::Scene(error) => error.fmt(f),
+            Self::Record(error) => error.fmt(f),
         }
     }
 }
@@ -95,6 +149,8 @@ impl std::error::Error for FrameError {
             Self::View(fault) => Some(fault),
             Self::Stage(panic) => Some(panic),
             Self::Draw(error) => Some(error),
+            Self::Scene(error) => Some(error),
+            Self::Record(error) => Some(error),
         }
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! In:    a scene, a pose each frame, pages from a loader; places and regions.
 //! Out:   draws, finished pictures, counts and a digest of each frame; heights of the ground.
-//! Keeps: [`Overfly`]: terrain, workers, graph, renderer, open archives, requested ground.
+//! Keeps: [`Overfly`]: terrain, workers, graph, renderer, open archives, requested ground, recording.
 //! Not here: the stages (`overfly_core`), Vulkan (`overfly_render_vk`), files (`overfly_replay`).
 #![forbid(unsafe_code)]
 
@@ -16,13 +16,18 @@ pub use overfly_render_vk as render_vk;
 pub use overfly_replay as replay;
 
 pub mod error;
+pub mod host;
 pub mod loader;
+mod pages;
+mod record;
 mod requests;
 mod resident;
 pub mod sources;
 pub mod surveyor;
 
-pub use error::{FlightError, FrameError, OpenError};
+pub use error::{ChangeError, FlightError, FrameError, OpenError};
+pub use host::{Host, HostThreads, Pages, Workers};
+pub use record::RecordError;
 pub use requests::{RequestError, Ticket};
 
 /// The README's program is compiled and run as a test.
@@ -31,7 +36,8 @@ pub use requests::{RequestError, Ticket};
 struct Readme;
 
 use crate::archive::OpenOptions;
-use crate::core::datasource::PageKey;
+use crate::core::camera::View;
+use crate::core::datasource::{Page, PageKey};
 use crate::core::frame::data::ViewDraws;
 use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
 use crate::core::geodesy::Geodetic;
@@ -39,15 +45,18 @@ use crate::core::ground::{Ground, Query, Readiness, Region, RegionFault};
 use crate::core::inspect::PatchInfo;
 use crate::core::scene::{FrameParts, extract, world_of};
 use crate::core::settings::SceneSettings;
-use crate::jobs::{Graph, Span, Spans, Team, Workers};
+use crate::jobs::{Graph, Span, Spans, Team};
 use crate::render_vk::{Backdrop, DrawError, DrawReport, Overlay, Picture, Renderer, Show};
 use crate::replay::Flight;
 use loader::Loader;
+use pages::Loading;
 use parking_lot::Mutex;
+use record::Recorder;
 use requests::Requests;
 use resident::ResidentGround;
 use sources::{SourceError, Sources};
 use std::cell::RefCell;
+use std::path::Path;
 use std::sync::Arc;
 use surveyor::Surveyor;
 
@@ -117,33 +126,28 @@ impl Drawing {
 pub struct Overfly {
     house: House,
     graph: Graph<House>,
-    workers: Workers,
+    workers: Arc<jobs::Workers>,
     sources: Arc<Sources>,
     ground: ResidentGround,
     requests: Requests,
     world: hecs::World,
+    scene: SceneSettings,
+    patience: OpenOptions,
+    loading: Loading,
+    recorder: Option<Recorder>,
+    frames: u64,
 }
 
 impl Overfly {
-    /// A scene with `workers` threads beside the caller; 0 is fine. Opens the scene's archives:
-    /// blocks where one is on a server.
+    /// A scene with what its host brings; a number is so many own workers. Opens the scene's
+    /// archives: blocks where one is on a server.
     ///
     /// # Errors
-    /// If the system refuses a thread, `workers` is above 64, or an archive cannot be used.
-    pub fn new(settings: &SceneSettings, workers: usize) -> Result<Self, OpenError> {
-        Self::with_options(settings, workers, &OpenOptions::default())
-    }
-
-    /// As [`Self::new`], as patient with servers as `options` says.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn with_options(
-        settings: &SceneSettings,
-        workers: usize,
-        options: &OpenOptions,
-    ) -> Result<Self, OpenError> {
-        let sources = Arc::new(Sources::open(settings, options).map_err(OpenError::Source)?);
+    /// The system refuses a thread, there are above 64 workers, or an archive cannot be used.
+    pub fn new(settings: &SceneSettings, host: impl Into<Host>) -> Result<Self, OpenError> {
+        let Host { workers, pages, patience } = host.into();
+        let sources = Arc::new(Sources::open(settings, &patience).map_err(OpenError::Source)?);
+        let loading = Loading::new(pages, &sources).map_err(OpenError::Loader)?;
         let terrain = Terrain::new(settings, sources.generator());
         let mut graph = Graph::new();
         let placed = add_stages(&mut graph, |house: &House| &house.terrain);
@@ -163,11 +167,16 @@ impl Overfly {
         Ok(Self {
             house: House { terrain, drawing: Mutex::default() },
             graph,
-            workers: Workers::new(workers).map_err(OpenError::Workers)?,
+            workers: Arc::new(workers.start().map_err(OpenError::Workers)?),
             ground: ResidentGround::new(settings.body, settings.sea),
             requests: Requests::new(sources.clone(), pages_max),
             sources,
             world: world_of(settings),
+            scene: settings.clone(),
+            patience,
+            loading,
+            recorder: None,
+            frames: 0,
         })
     }
 
@@ -208,6 +217,14 @@ impl Overfly {
         output: &mut FrameOutput,
         view: Option<usize>,
     ) -> Result<Option<DrawReport>, FrameError> {
+        input.views.iter().try_for_each(View::check).map_err(FrameError::View)?;
+        if let Some(scene) = input.scene.take() {
+            self.change(&scene, &mut input.arrived).map_err(FrameError::Scene)?;
+        }
+        self.loading.collect(&mut input.arrived);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.note(input);
+        }
         self.ground.note(input.arrived.iter().map(|page| page.key));
         let time_s = input.time_s;
         self.house.terrain.begin(input).map_err(FrameError::View)?;
@@ -215,10 +232,91 @@ impl Overfly {
         (drawing.view, drawing.parts) = (view, extract(&self.world, time_s));
         let ran = self.graph.run(&self.house, &self.workers);
         self.house.terrain.finish(output);
+        self.frames += 1;
         self.ground.note(output.evicted.iter().map(|page| page.key));
         self.requests.collect(|key| self.ground.note(std::iter::once(key)));
+        self.loading.request(&output.wanted);
         ran.map_err(FrameError::Stage)?;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.write(output.digest).map_err(FrameError::Record)?;
+        }
         self.house.drawing.get_mut().report.take().transpose().map_err(FrameError::Draw)
+    }
+
+    /// Goes over to another scene. Where more than the sun is another the terrain begins anew, and
+    /// pages that arrive with the change are not taken.
+    fn change(
+        &mut self,
+        scene: &SceneSettings,
+        arrived: &mut Vec<Arc<Page>>,
+    ) -> Result<(), ChangeError> {
+        let now = &self.scene;
+        if now == scene {
+            return Ok(());
+        }
+        let fixed = [
+            ("body", now.body == scene.body),
+            ("lod", now.lod == scene.lod),
+            ("depth", now.depth == scene.depth),
+            ("memory", now.memory == scene.memory),
+            ("vertices", now.vertices == scene.vertices),
+            ("imagery", now.imagery == scene.imagery),
+        ];
+        if let Some((setting, _)) = fixed.iter().find(|(_, same)| !same) {
+            return Err(ChangeError::Fixed { setting });
+        }
+        if let Some(recorder) = &mut self.recorder {
+            recorder.note_scene(scene).map_err(ChangeError::Record)?;
+        }
+        let is_ground = now.sources == scene.sources && now.sea == scene.sea;
+        if now.sources != scene.sources {
+            let sources = Sources::open(scene, &self.patience).map_err(ChangeError::Source)?;
+            let sources = Arc::new(sources);
+            self.loading.follow(&sources).map_err(ChangeError::Loader)?;
+            self.requests = Requests::new(sources.clone(), self.house.terrain.limits().pages);
+            self.sources.close();
+            self.sources = sources;
+        }
+        if !is_ground {
+            self.house.terrain = Terrain::new(scene, self.sources.generator());
+            self.ground = ResidentGround::new(scene.body, scene.sea);
+            self.loading.forget();
+            arrived.clear();
+            if let Some(renderer) = &mut self.house.drawing.get_mut().renderer {
+                renderer.note_tiles(&self.house.terrain.tiles());
+            }
+        }
+        self.world = world_of(scene);
+        self.scene = scene.clone();
+        Ok(())
+    }
+
+    /// Records every frame from now on into a file that [`Self::finish_recording`] completes. To be
+    /// asked for before the first frame; `name` and `rate_hz` are what a replay shows.
+    ///
+    /// # Errors
+    /// Frames were run already, the file system refuses, or the scene has no text.
+    pub fn record(&mut self, path: &Path, name: &str, rate_hz: f64) -> Result<(), RecordError> {
+        if self.frames > 0 {
+            return Err(RecordError::Late { frames: self.frames });
+        }
+        let contents = self.sources.contents();
+        let scene = (&self.scene, contents.as_slice());
+        self.recorder = Some(Recorder::create(path, (name, rate_hz), scene)?);
+        Ok(())
+    }
+
+    /// Completes the recording; how many frames it has. Without this it reads to its last frame.
+    ///
+    /// # Errors
+    /// There is none, or the file system refuses.
+    pub fn finish_recording(&mut self) -> Result<u64, RecordError> {
+        self.recorder.take().ok_or(RecordError::None)?.finish()
+    }
+
+    /// The workers, for threads of the host to help: see [`HostThreads::Lent`].
+    pub fn crew(&self) -> Arc<jobs::Workers> {
+        self.workers.clone()
     }
 
     /// Draws another view of the last frame, on the caller alone; `None` without a renderer or
@@ -251,7 +349,13 @@ impl Overfly {
         &self.house.terrain
     }
 
-    /// The optional parts of the scene; change them between frames.
+    /// The scene as it is now.
+    pub fn scene(&self) -> &SceneSettings {
+        &self.scene
+    }
+
+    /// The optional parts of the scene; change them between frames. What is changed here is not
+    /// recorded: see `FrameInput::scene`.
     pub fn world_mut(&mut self) -> &mut hecs::World {
         &mut self.world
     }
@@ -316,9 +420,10 @@ impl Overfly {
         self.follow().readiness(region, level)
     }
 
-    /// Pages of requested regions that could not be loaded when they were last asked for.
+    /// Pages, of requested regions and of a loader of ours, that could not be loaded when they were
+    /// last asked for.
     pub fn faults(&self) -> impl Iterator<Item = (PageKey, &SourceError)> {
-        self.requests.faults()
+        self.requests.faults().chain(self.loading.faults())
     }
 
     /// Answers for tools, which wait until the pages that they need are loaded.

@@ -12,6 +12,7 @@ mod contracts {
     mod command_line;
     mod cracks;
     mod depths;
+    mod embedding;
     mod extremes;
     mod flights;
     mod grounds;

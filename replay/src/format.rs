@@ -22,6 +22,7 @@
 //! |---|---|
 //! | 1 | flights, which are still written so; recordings without flags |
 //! | 2 | recordings with a byte of flags at the end of each frame |
+//! | 3 | recordings whose scene changes on the way |
 //!
 //! There is no index: every [`KEY_EVERY`]-th frame refers to none before it, a block is known by its
 //! checks wherever a reader lands, and a frame's block begins with its index. So any frame is found by
@@ -40,9 +41,11 @@ use overfly_core::settings::SceneSettings;
 /// The first bytes of every file.
 pub const MAGIC: [u8; 8] = *b"OVERFLY\0";
 /// The newest version; this crate reads all of them, and writes the oldest that holds the kind.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// The first version.
 const FIRST_VERSION: u32 = 1;
+/// The first version whose frames may change the scene.
+const SCENES_VERSION: u32 = 3;
 /// Every frame whose index is a multiple of this refers to no earlier one.
 pub const KEY_EVERY: u64 = 256;
 /// Largest payload of a block in bytes.
@@ -98,6 +101,11 @@ impl fmt::Display for Kind {
     }
 }
 
+/// Whether the frames of recordings of a version may change the scene.
+pub(crate) fn has_scenes(version: u32) -> bool {
+    version >= SCENES_VERSION
+}
+
 /// One frame of a recording: what went in, and what state it ended in.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct RecordedFrame {
@@ -109,6 +117,9 @@ pub struct RecordedFrame {
     pub arrived: Vec<PageKey>,
     /// The mesh was held as it was; `false` in all recordings of version 1.
     pub hold_lod: bool,
+    /// The scene file from this frame on, where it is another than before. Of frames that are read
+    /// out of order the first tells the one in force, if that is not the header's.
+    pub scene: Option<String>,
     /// What the frame ended in.
     pub digest: FrameDigest,
 }

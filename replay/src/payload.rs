@@ -10,15 +10,16 @@
 //! recording   index, count of views, words: time, four digests, then of each view: eye x y z,
 //!             orientation x y z w, field of view, near distance, width | height << 32;
 //!             count of arrivals, key of each against the key before; from version 2 on
-//!             flags u8 (1: the level of detail was held)
+//!             flags u8 (1: the level of detail was held; from version 3 on 2: a scene text follows,
+//!             in force from this frame on, and repeated in every key frame)
 //! ```
 //!
 //! The reference of a time is index / rate, so that a steady clock takes one byte a frame; that of
 //! any other word is the same word one frame earlier, or 0 in a key frame and where there is none.
 
-use crate::format::{KEY_EVERY, RecordedFrame};
+use crate::format::{KEY_EVERY, RecordedFrame, has_flags, has_scenes};
 use crate::pose::Pose;
-use crate::words::{Input, put_count, put_word};
+use crate::words::{Input, put_count, put_text, put_word};
 use glam::{DQuat, DVec3};
 use overfly_core::camera::View;
 use overfly_core::datasource::PageKey;
@@ -31,6 +32,8 @@ const FRAME_WORDS: usize = 5;
 const VIEW_WORDS: usize = 10;
 /// The level of detail was held.
 const HOLD_LOD: u8 = 1;
+/// A scene text follows.
+const SCENE: u8 = 2;
 
 /// What the next frame refers to.
 pub(crate) struct Columns {
@@ -39,18 +42,44 @@ pub(crate) struct Columns {
     pub(crate) index: u64,
     words: Vec<u64>,
     previous: Vec<u64>,
+    /// The scene in force since it was changed, and what the frame last coded makes of it.
+    scene: Option<String>,
+    changed: Option<String>,
+    /// No frame that was read has told the scene in force.
+    untold: bool,
 }
 
 impl Columns {
     /// Before the first frame.
     pub(crate) fn new(rate_hz: f64) -> Self {
-        Self { rate_hz, index: 0, words: Vec::new(), previous: Vec::new() }
+        Self {
+            rate_hz,
+            index: 0,
+            words: Vec::new(),
+            previous: Vec::new(),
+            scene: None,
+            changed: None,
+            untold: false,
+        }
     }
 
     /// Makes the frame last coded the one that the next refers to.
     pub(crate) fn advance(&mut self) {
         core::mem::swap(&mut self.words, &mut self.previous);
+        if self.changed.is_some() {
+            self.scene = self.changed.take();
+        }
         self.index += 1;
+    }
+
+    /// Goes on with key frame `index`, which tells the scene in force anew.
+    pub(crate) fn jump(&mut self, index: u64) {
+        (self.index, self.scene, self.changed) = (index, None, None);
+    }
+
+    /// Has the next frame tell the scene in force, since those before it were skipped.
+    pub(crate) fn skipped(&mut self) {
+        self.untold = self.scene.is_some();
     }
 
     fn reference(&self, word: usize) -> u64 {
@@ -107,7 +136,14 @@ impl Columns {
             put_word(out, key.bits(), before);
             before = key.bits();
         }
-        out.push(if frame.hold_lod { HOLD_LOD } else { 0 });
+        self.changed = frame.scene.clone().filter(|text| self.scene.as_ref() != Some(text));
+        let is_key = self.index.is_multiple_of(KEY_EVERY);
+        let scene = self.changed.as_ref().or(self.scene.as_ref().filter(|_| is_key));
+        let flag = |set, bit| if set { bit } else { 0 };
+        out.push(flag(frame.hold_lod, HOLD_LOD) | flag(scene.is_some(), SCENE));
+        if let Some(text) = scene {
+            put_text(out, text);
+        }
     }
 
     /// Reads the index in front of a payload.
@@ -128,11 +164,11 @@ impl Columns {
         })
     }
 
-    /// Reads a recorded frame after its index, with flags or from before there were any.
+    /// Reads a recorded frame of a version after its index.
     pub(crate) fn decode_frame(
         &mut self,
         input: &mut Input<'_>,
-        has_flags: bool,
+        version: u32,
     ) -> Result<RecordedFrame, &'static str> {
         let views = input.count().and_then(|n| usize::try_from(n).ok()).ok_or("count of views")?;
         let words = views.checked_mul(VIEW_WORDS).and_then(|n| n.checked_add(FRAME_WORDS));
@@ -140,8 +176,10 @@ impl Columns {
         let words = words.filter(|&n| n <= input.len()).ok_or("count of views")?;
         self.take_words(input, words).ok_or("views")?;
         let arrived = decode_arrivals(input).ok_or("arrivals")?;
-        let flags = if has_flags { input.byte() } else { Some(0) };
-        let flags = flags.filter(|flags| flags & !HOLD_LOD == 0).ok_or("flags")?;
+        let flags = if has_flags(version) { input.byte() } else { Some(0) };
+        let known = if has_scenes(version) { HOLD_LOD | SCENE } else { HOLD_LOD };
+        let flags = flags.filter(|flags| flags & !known == 0).ok_or("flags")?;
+        let scene = self.decode_scene(input, flags & SCENE != 0)?;
         let [_, pages, mesh, vertices, draws] =
             self.words[..FRAME_WORDS].try_into().expect("the frame's words were read");
         Ok(RecordedFrame {
@@ -149,8 +187,25 @@ impl Columns {
             views: self.words[FRAME_WORDS..].chunks_exact(VIEW_WORDS).map(view_of_words).collect(),
             arrived,
             hold_lod: flags & HOLD_LOD != 0,
+            scene,
             digest: FrameDigest { pages, mesh, vertices, draws },
         })
+    }
+}
+
+impl Columns {
+    /// The scene that a frame changes to, or that was changed to in what was skipped.
+    fn decode_scene(
+        &mut self,
+        input: &mut Input<'_>,
+        follows: bool,
+    ) -> Result<Option<String>, &'static str> {
+        if follows {
+            let text = input.text().ok_or("scene")?;
+            self.changed = Some(text).filter(|text| self.scene.as_ref() != Some(text));
+        }
+        let untold = core::mem::take(&mut self.untold);
+        Ok(self.changed.clone().or_else(|| self.scene.clone().filter(|_| untold)))
     }
 }
 

@@ -92,6 +92,7 @@ fn tiny_frames() -> Vec<RecordedFrame> {
         views: vec![view(0.0)],
         arrived: vec![PageKey::root(0), PageKey::root(3), PageKey::root(3).child(2)],
         hold_lod: false,
+        scene: None,
         digest,
     };
     let second = RecordedFrame {
@@ -99,6 +100,7 @@ fn tiny_frames() -> Vec<RecordedFrame> {
         views: vec![view(0.25), view(100.0)],
         arrived: vec![],
         hold_lod: true,
+        scene: None,
         digest: FrameDigest { draws: 5, ..digest },
     };
     let third = RecordedFrame { time_s: 0.04, views: vec![], ..RecordedFrame::default() };
@@ -202,7 +204,7 @@ fn any_frame() -> impl Strategy<Value = RecordedFrame> {
     (fed, any::<[u64; 4]>()).prop_map(|((time_s, views, arrived, hold_lod), parts)| {
         let [pages, mesh, vertices, draws] = parts;
         let digest = FrameDigest { pages, mesh, vertices, draws };
-        RecordedFrame { time_s, views, arrived, hold_lod, digest }
+        RecordedFrame { time_s, views, arrived, hold_lod, scene: None, digest }
     })
 }
 
@@ -437,8 +439,54 @@ fn golden(hex: &str) -> Vec<u8> {
 
 /// A change of these bytes makes every existing recording unreadable: raise the version with it.
 #[test]
-fn the_layout_of_version_2_is_as_it_always_was() {
-    assert_eq!(tiny_bytes(), golden(include_str!("golden/tiny_2.hex")));
+fn the_layout_of_version_3_is_as_it_always_was() {
+    let mut as_version_3 = golden(include_str!("golden/tiny_2.hex"));
+    as_version_3[8] = 3;
+    assert_eq!(tiny_bytes(), as_version_3, "without a change of scene it is that of version 2");
+}
+
+#[test]
+fn recordings_of_version_2_are_still_read() {
+    let (frames, complete, error) = read_all(&golden(include_str!("golden/tiny_2.hex")));
+    assert!(complete && error.is_none());
+    assert_eq!(frames, tiny_frames());
+}
+
+/// Frames 3 and 300 change the scene; a reader that comes in between is told the one in force.
+#[test]
+fn a_change_of_the_scene_is_told_once_and_again_to_who_comes_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("edits.ovf");
+    let scene = |index| match index {
+        3 => Some("Scene(body: Mars)".to_owned()),
+        300 => Some("Scene(body: Moon)".to_owned()),
+        _ => None,
+    };
+    let frame = |index: u32| RecordedFrame {
+        time_s: f64::from(index) / 60.0,
+        scene: scene(index),
+        ..RecordedFrame::default()
+    };
+    let frames: Vec<_> = (0..520).map(frame).collect();
+    write_recording(&path, &tiny_header(), &frames).finish().unwrap();
+    let mut reader = Reader::open(&path).unwrap();
+    let played = |frame: Frame| match frame {
+        Frame::Recorded(frame) => frame,
+        Frame::Pose(_) => panic!("a pose in a recording"),
+    };
+    let read: Vec<_> = reader.by_ref().map(|frame| played(frame.unwrap())).collect();
+    assert_eq!(read, frames);
+    for (at, told) in
+        [(2, None), (5, scene(3)), (256, scene(3)), (299, scene(3)), (519, scene(300))]
+    {
+        reader.seek(0).unwrap();
+        reader.seek(at).unwrap();
+        let mut next = || played(reader.next().unwrap().unwrap());
+        assert_eq!(next().scene, told, "frame {at}");
+        if at < 519 {
+            assert_eq!(next().scene, scene(u32::try_from(at + 1).unwrap()), "after frame {at}");
+        }
+    }
 }
 
 #[test]
@@ -450,13 +498,13 @@ fn recordings_of_version_1_are_still_read_and_held_nothing() {
 }
 
 #[test]
-fn a_flight_is_written_as_version_1_and_a_recording_as_version_2() {
+fn a_flight_is_written_as_version_1_and_a_recording_as_version_3() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("any.ovf");
     Writer::create(&path, &Header::flight("flight", 60.0)).unwrap().finish().unwrap();
     assert_eq!(fs::read(&path).unwrap()[8..12], [1, 0, 0, 0]);
-    assert_eq!(tiny_bytes()[8..12], [2, 0, 0, 0]);
-    for version in [0, 3] {
+    assert_eq!(tiny_bytes()[8..12], [3, 0, 0, 0]);
+    for version in [0, 4] {
         let mut bytes = tiny_bytes();
         bytes[8] = version;
         assert!(matches!(read_all(&bytes).2, Some(ReadError::Version { found, .. })

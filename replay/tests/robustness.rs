@@ -44,6 +44,7 @@ fn frame(index: u64) -> RecordedFrame {
         views: vec![view],
         arrived: if index.is_multiple_of(5) { vec![PageKey::root(1), key] } else { vec![] },
         hold_lod: index.is_multiple_of(7),
+        scene: None,
         digest: FrameDigest {
             pages: chain(1),
             mesh: chain(2),

@@ -135,10 +135,21 @@ impl Flown {
         if !self.source.load(played) {
             return Err(self.source.fault());
         }
-        self.source.fill(&self.scene, self.size_px, &mut self.input);
+        self.source.fill(&self.scene, self.size_px, &mut self.input)?;
         if held {
             self.input.time_s -= 1.0 / self.source.rate_hz();
             self.input.hold_lod = false;
+        }
+        if let Some(scene) = &self.input.scene {
+            let sun = scene.sun;
+            if **scene != (SceneSettings { sun, ..self.scene.clone() }) {
+                let name = self.source.name();
+                return Err(format!(
+                    "{name}: the ground becomes another in frame {played}; only `replay` follows \
+                     that, here allowed is a change of the sun"
+                )
+                .into());
+            }
         }
         let arriving = self.arriving();
         self.loader.fetch(&arriving, &mut self.input.arrived);

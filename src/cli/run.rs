@@ -11,6 +11,7 @@ use super::source::Source;
 use super::stills::{Stills, write_png};
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::Overfly;
+use overfly::config;
 use overfly::core::datasource::PageKey;
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
@@ -129,12 +130,14 @@ fn frame(
     if !run.source.load(played) {
         return Ok(false);
     }
-    run.source.fill(&run.scene, run.size_px, input);
+    run.source.fill(&run.scene, run.size_px, input)?;
     if !counted && !run.source.is_followed() {
         // The lead-in's clock stands one frame before the first: so a recording tells them apart.
         input.time_s -= 1.0 / run.source.rate_hz();
         input.hold_lod = false;
     }
+    let scene = input.scene.as_ref().map(|scene| config::write(scene)).transpose()?;
+    let changes = scene.is_some();
     let arriving = arriving(run, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
     if input.arrived.len() < arriving.len() {
@@ -142,7 +145,7 @@ fn frame(
     }
     let arrived = input.arrived.iter().map(|page| page.key).collect();
     let FrameInput { time_s, hold_lod, .. } = *input;
-    let mut record = RecordedFrame { time_s, arrived, hold_lod, ..Default::default() };
+    let mut record = RecordedFrame { time_s, arrived, hold_lod, scene, ..Default::default() };
     if run.recorder.is_some() {
         record.views.extend_from_slice(&input.views);
     }
@@ -157,6 +160,10 @@ fn frame(
         overfly.frame(input, output)?;
     }
     let end_ns = now_ns();
+    if changes {
+        run.loader = overfly.loader(super::replay::default_workers().max(1))?;
+        run.coming.clear();
+    }
     if still && drawn {
         take_stills(run, overfly, index, output)?;
     }

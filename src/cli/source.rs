@@ -8,6 +8,7 @@
 
 use super::{Failure, import};
 use overfly::Overfly;
+use overfly::config;
 use overfly::core::datasource::PageKey;
 use overfly::core::digest::FrameDigest;
 use overfly::core::frame::FrameInput;
@@ -274,7 +275,15 @@ impl Source {
     }
 
     /// Fills what the current frame starts from but its pages; a flight's views are the scene's.
-    pub fn fill(&self, scene: &SceneSettings, size_px: [u32; 2], input: &mut FrameInput) {
+    ///
+    /// # Errors
+    /// The recording changes to a scene that cannot be read.
+    pub fn fill(
+        &self,
+        scene: &SceneSettings,
+        size_px: [u32; 2],
+        input: &mut FrameInput,
+    ) -> Result<(), Failure> {
         input.views.clear();
         match &self.current {
             Some((_, Frame::Pose(pose))) => {
@@ -285,9 +294,12 @@ impl Source {
             Some((_, Frame::Recorded(frame))) => {
                 (input.time_s, input.hold_lod) = (frame.time_s, frame.hold_lod);
                 input.views.extend_from_slice(&frame.views);
+                let read = |text| config::read(text, &format!("{}: changed scene", self.name));
+                input.scene = frame.scene.as_deref().map(read).transpose()?.map(Box::new);
             }
             None => {}
         }
+        Ok(())
     }
 
     /// The pages that arrived in the current frame, if that was recorded and counts.

@@ -36,7 +36,7 @@ impl Track {
         let mut source = Source::open_any(name, overfly)?;
         let mut input = FrameInput::default();
         if source.load(0) {
-            source.fill(scene, [1, 1], &mut input);
+            source.fill(scene, [1, 1], &mut input)?;
         }
         let Some(shown) = input.views.first().copied() else {
             return Err(format!("{name} holds no frame that can be shown").into());
@@ -55,8 +55,9 @@ impl Track {
     /// The first view of a frame. Its size is the window's, not its own. Where the frame cannot be
     /// read or has no view it is the one that was asked for before.
     pub fn view(&mut self, frame: usize) -> View {
-        if self.source.load(frame) {
-            self.source.fill(&self.scene, [1, 1], &mut self.input);
+        let fills = self.source.load(frame)
+            && self.source.fill(&self.scene, [1, 1], &mut self.input).is_ok();
+        if fills {
             self.shown = self.input.views.first().copied().unwrap_or(self.shown);
         }
         self.shown

@@ -69,6 +69,7 @@ impl Session {
                 views: vec![view],
                 arrived,
                 hold_lod: self.switches.frozen,
+                scene: None,
                 digest: self.output.digest,
             })?;
         }

@@ -12,7 +12,7 @@ use super::server::{Server, Stall};
 use overfly::archive::OpenOptions;
 use overfly::core::datasource::PageKey;
 use overfly::core::datasource::page::Origin;
-use overfly::{OpenError, Overfly, config};
+use overfly::{Host, OpenError, Overfly, config};
 use std::io::{BufRead, BufReader, Read};
 use std::time::Duration;
 
@@ -118,7 +118,7 @@ fn a_dead_server_leaves_the_ground_coarser_until_it_lives_again() {
         ..OpenOptions::default()
     };
     let scene = config::load(&hills.scene_name()).unwrap();
-    let overfly = Overfly::with_options(&scene, 0, &options).unwrap();
+    let overfly = Overfly::new(&scene, Host { patience: options, ..Host::default() }).unwrap();
     let mut tour = Tour::over(overfly, scene, "poles");
     tour.frame(0, false);
     tour.frame(0, false);

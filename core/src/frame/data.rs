@@ -9,6 +9,7 @@ use crate::camera::{Camera, View};
 use crate::datasource::{Page, PageKey};
 use crate::digest::FrameDigest;
 use crate::mesh::drape::NewTile;
+use crate::settings::SceneSettings;
 use std::sync::Arc;
 
 /// What one frame starts from.
@@ -22,6 +23,8 @@ pub struct FrameInput {
     pub arrived: Vec<Arc<Page>>,
     /// The mesh stays as it is, and no page is asked for: only the draws follow the views.
     pub hold_lod: bool,
+    /// Another scene from this frame on, for who runs the terrain: the stages do not look at it.
+    pub scene: Option<Box<SceneSettings>>,
 }
 
 /// What one frame ended in.

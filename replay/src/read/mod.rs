@@ -11,7 +11,7 @@ mod error;
 
 use crate::format::{
     END_MARK, FRAME_MARK, HEADER_MARK, Header, KEY_EVERY, Kind, MAGIC, RecordedFrame, VERSION,
-    has_flags, is_readable,
+    is_readable,
 };
 use crate::payload::Columns;
 use crate::pose::Pose;
@@ -198,6 +198,10 @@ impl Reader {
     /// Where the file has fewer frames, or one on the way from the key frame is damaged.
     pub fn seek(&mut self, frame: u64) -> Result<(), ReadError> {
         let key = frame - frame % KEY_EVERY;
+        if self.columns.index == frame {
+            self.done = false;
+            return Ok(());
+        }
         if !(key..=frame).contains(&self.columns.index) {
             self.jump(key)?;
         }
@@ -207,7 +211,11 @@ impl Reader {
                 return Err(self.beyond(frame));
             }
         }
-        if self.columns.index == frame { Ok(()) } else { Err(self.beyond(frame)) }
+        if self.columns.index != frame {
+            return Err(self.beyond(frame));
+        }
+        self.columns.skipped();
+        Ok(())
     }
 
     /// Makes a key frame the next one.
@@ -215,10 +223,12 @@ impl Reader {
         let place = blocks::key_frame(&mut self.bytes, self.first, key);
         let place = place.map_err(|error| self.broken(error.into()))?;
         self.complete = false;
-        (self.offset, self.columns.index) = match place {
+        let (offset, index) = match place {
             Place::At(offset) => (offset, key),
             Place::Lost { frames, end } | Place::Beyond { frames, end } => (end, frames),
         };
+        self.offset = offset;
+        self.columns.jump(index);
         if let Place::Lost { frames, .. } = place {
             let fault = Fault::Index { expected: frames, found: key };
             return Err(self.block().err().unwrap_or_else(|| self.corrupt(fault)));
@@ -325,9 +335,7 @@ fn decoded(
     }
     let frame = match kind {
         Kind::Flight => columns.decode_pose(&mut input).map(Frame::Pose),
-        Kind::Recording => {
-            columns.decode_frame(&mut input, has_flags(version)).map(Frame::Recorded)
-        }
+        Kind::Recording => columns.decode_frame(&mut input, version).map(Frame::Recorded),
     };
     let frame = frame.map_err(|name| Fault::Field { name })?;
     if input.len() != 0 {
