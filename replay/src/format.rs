@@ -22,7 +22,7 @@
 //! |---|---|
 //! | 1 | flights, which are still written so; recordings without flags |
 //! | 2 | recordings with a byte of flags at the end of each frame |
-//! | 3 | recordings whose scene changes on the way |
+//! | 4 | recordings whose scene changes on the way; 3 is left out, for a flipped bit would make it 2 |
 //!
 //! There is no index: every [`KEY_EVERY`]-th frame refers to none before it, a block is known by its
 //! checks wherever a reader lands, and a frame's block begins with its index. So any frame is found by
@@ -41,11 +41,11 @@ use overfly_core::settings::SceneSettings;
 /// The first bytes of every file.
 pub const MAGIC: [u8; 8] = *b"OVERFLY\0";
 /// The newest version; this crate reads all of them, and writes the oldest that holds the kind.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// The first version.
 const FIRST_VERSION: u32 = 1;
 /// The first version whose frames may change the scene.
-const SCENES_VERSION: u32 = 3;
+const SCENES_VERSION: u32 = 4;
 /// Every frame whose index is a multiple of this refers to no earlier one.
 pub const KEY_EVERY: u64 = 256;
 /// Largest payload of a block in bytes.
@@ -84,7 +84,7 @@ impl Kind {
 
 /// Whether this crate reads a version.
 pub(crate) fn is_readable(version: u32) -> bool {
-    (FIRST_VERSION..=VERSION).contains(&version)
+    matches!(version, FIRST_VERSION | 2 | VERSION)
 }
 
 /// Whether the frames of recordings of a version have flags.

@@ -10,7 +10,7 @@
 //! recording   index, count of views, words: time, four digests, then of each view: eye x y z,
 //!             orientation x y z w, field of view, near distance, width | height << 32;
 //!             count of arrivals, key of each against the key before; from version 2 on
-//!             flags u8 (1: the level of detail was held; from version 3 on 2: a scene text follows,
+//!             flags u8 (1: the level of detail was held; from version 4 on 2: a scene text follows,
 //!             in force from this frame on, and repeated in every key frame)
 //! ```
 //!

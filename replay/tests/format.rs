@@ -369,7 +369,7 @@ fn errors_say_file_offset_expected_and_found() {
     let text = |bytes: &[u8]| read_all(bytes).2.unwrap().to_string();
     let mut bytes = whole.clone();
     bytes[8] = 9;
-    assert_eq!(text(&bytes), "tiny.ovf: at byte 8: expected version 1 to 2, found version 9");
+    assert_eq!(text(&bytes), "tiny.ovf: at byte 8: expected version 1, 2 or 4, found version 9");
     assert_eq!(
         text(b"RIFF\x01\0\0\0WAVE"),
         "tiny.ovf: at byte 0: expected \"OVERFLY\\x00\", found \"RIFF\\x01\\x00\\x00\\x00\""
@@ -439,10 +439,10 @@ fn golden(hex: &str) -> Vec<u8> {
 
 /// A change of these bytes makes every existing recording unreadable: raise the version with it.
 #[test]
-fn the_layout_of_version_3_is_as_it_always_was() {
-    let mut as_version_3 = golden(include_str!("golden/tiny_2.hex"));
-    as_version_3[8] = 3;
-    assert_eq!(tiny_bytes(), as_version_3, "without a change of scene it is that of version 2");
+fn the_layout_of_version_4_is_as_it_always_was() {
+    let mut as_version_4 = golden(include_str!("golden/tiny_2.hex"));
+    as_version_4[8] = 4;
+    assert_eq!(tiny_bytes(), as_version_4, "without a change of scene it is that of version 2");
 }
 
 #[test]
@@ -498,13 +498,13 @@ fn recordings_of_version_1_are_still_read_and_held_nothing() {
 }
 
 #[test]
-fn a_flight_is_written_as_version_1_and_a_recording_as_version_3() {
+fn a_flight_is_written_as_version_1_and_a_recording_as_version_4() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("any.ovf");
     Writer::create(&path, &Header::flight("flight", 60.0)).unwrap().finish().unwrap();
     assert_eq!(fs::read(&path).unwrap()[8..12], [1, 0, 0, 0]);
-    assert_eq!(tiny_bytes()[8..12], [3, 0, 0, 0]);
-    for version in [0, 4] {
+    assert_eq!(tiny_bytes()[8..12], [4, 0, 0, 0]);
+    for version in [0, 3, 5] {
         let mut bytes = tiny_bytes();
         bytes[8] = version;
         assert!(matches!(read_all(&bytes).2, Some(ReadError::Version { found, .. })

@@ -9,6 +9,7 @@ mod chart;
 mod errors;
 mod fly;
 mod html;
+mod instructions;
 mod junit;
 mod markdown;
 mod options;
@@ -27,7 +28,7 @@ pub use options::Arguments;
 use overfly::config::{self, read_budget};
 use overfly::core::settings::SceneSettings;
 use overfly::replay::budget::judge::{budget_names, incomparable, known_names};
-use overfly::replay::budget::record::{ERRORS, FRAME, times};
+use overfly::replay::budget::record::{ERRORS, FRAME, INSTRUCTIONS, times};
 use overfly::replay::budget::{
     BudgetSettings, Outcome, PairRule, RunRecord, Statistic, Status, Verdict, init, judge, outcome,
 };
@@ -128,6 +129,9 @@ fn given(arguments: &Arguments) -> Result<Given, Failure> {
         )
         .into());
     }
+    if arguments.instructions == 0 && budget.lines.iter().any(|line| line.of == INSTRUCTIONS) {
+        return Err("the budget names instructions, which only --instructions N counts".into());
+    }
     let baseline = arguments.baseline.as_deref().map(read_record).transpose()?;
     let mut taken = read_by([Some(&arguments.flight), arguments.scene.as_ref()]);
     let files = [arguments.baseline.as_deref(), arguments.budget.as_deref()];
@@ -174,6 +178,7 @@ fn plan(arguments: &Arguments, given: &Given) -> Result<Plan, Failure> {
     Ok(Plan {
         flight: arguments.flight.clone(),
         scene_name,
+        scene_given: arguments.scene.clone(),
         scene,
         manner: Manner { workers, size_px: arguments.size, delay_s },
         frames: arguments.frames.clone(),
@@ -209,6 +214,11 @@ fn flown(
     let count = arguments.errors as usize;
     if count > 0 && !given.is_recording && !stop.load(Ordering::Relaxed) {
         flew.record.errors = errors::sample(plan, &flew.record, count, stop)?;
+    }
+    if arguments.instructions > 0 && !stop.load(Ordering::Relaxed) {
+        let clip = (flew.record.facts.first_frame as usize, arguments.instructions as usize);
+        let clip = (clip.0, clip.1.min(flew.record.frames()));
+        flew.record.instructions = instructions::count(plan, clip, stop)?;
     }
     Ok(flew)
 }

@@ -19,7 +19,7 @@ use charts::Worst;
 use indicatif::{ProgressBar, ProgressStyle};
 use overfly::config;
 use overfly::core::settings::SceneSettings;
-use overfly::replay::measure::{FlightErrors, Measure, MeasureSettings};
+use overfly::replay::measure::{FlightErrors, MakePage, Measure, MeasureSettings, Taken};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -226,16 +226,18 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
         flown.source.forget_states();
     }
     let came_up = flown.lead_in(facts.frames.start, &stop)?;
+    let mut pair = Pair { taken: Taken::new(facts.scene.body), is_taken: false, is_ahead: false };
     for index in facts.frames.clone() {
         if !came_up || stop.load(Ordering::Relaxed) {
             facts.interrupted = true;
             break;
         }
-        flown.frame(index)?;
-        let (terrain, output) = (flown.overfly.terrain(), &flown.output);
+        pair.fly(&mut flown, index)?;
         let left = (index - facts.frames.start) % facts.every;
-        if left == 0 && !output.views.is_empty() {
-            if !measure.frame((terrain, output), index as u64, &make, &mut errors) {
+        if left == 0 && !flown.output.views.is_empty() {
+            let next = Some(index + 1).filter(|next| facts.every == 1 && *next < facts.frames.end);
+            let ground = (&make as MakePage<'_>, &mut errors);
+            if !pair.measure((&mut measure, &mut flown), (index, next), ground)? {
                 facts.interrupted = true;
                 break;
             }
@@ -244,8 +246,8 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
             if worst.as_ref().is_none_or(|worst| worst.frame.e1_px.max < frame.e1_px.max) {
                 worst = Some(Worst { frame: frame.clone(), map: measure.map() });
             }
-        } else if left + 1 == facts.every {
-            measure.take(terrain, output);
+        } else if left + 1 == facts.every && !flown.output.views.is_empty() {
+            measure.take(flown.overfly.terrain(), &flown.output);
         } else {
             measure.cut();
         }
@@ -254,4 +256,56 @@ fn measure(mut flown: Flown, facts: &mut Facts) -> Result<(FlightErrors, Option<
     bar.finish_and_clear();
     flown.overfly.close();
     Ok((errors, worst))
+}
+
+/// A frame that is measured, and the next one, which is flown meanwhile: both have serial parts.
+struct Pair {
+    taken: Taken,
+    /// The mesh of the frame that was flown last was taken.
+    is_taken: bool,
+    /// The frame that is asked for next was flown already.
+    is_ahead: bool,
+}
+
+impl Pair {
+    /// Flies a frame, if that was not done.
+    fn fly(&mut self, flown: &mut Flown, index: usize) -> Result<(), Failure> {
+        if std::mem::take(&mut self.is_ahead) {
+            return Ok(());
+        }
+        self.is_taken = false;
+        flown.frame(index)
+    }
+
+    fn take(&mut self, flown: &Flown) {
+        self.is_taken = !flown.output.views.is_empty();
+        if self.is_taken {
+            self.taken.take(flown.overfly.terrain(), &flown.output);
+        }
+    }
+
+    /// Measures frame `index`, and flies the next one beside it where its terrain is not needed any
+    /// more. False if it was stopped.
+    fn measure(
+        &mut self,
+        (measure, flown): (&mut Measure, &mut Flown),
+        (index, next): (usize, Option<usize>),
+        (make, errors): (MakePage<'_>, &mut FlightErrors),
+    ) -> Result<bool, Failure> {
+        if !self.is_taken {
+            self.take(flown);
+        }
+        measure.accept(&mut self.taken);
+        let Some(next) = next.filter(|_| !measure.needs_terrain()) else {
+            let frame = (flown.overfly.terrain(), &flown.output);
+            return Ok(measure.judge(frame, index as u64, make, errors));
+        };
+        std::thread::scope(|scope| {
+            let judging = scope.spawn(|| measure.judge_accepted(index as u64, make, errors));
+            flown.frame(next)?;
+            self.take(flown);
+            self.is_ahead = true;
+            Ok(judging.join().expect("measuring does not panic"))
+        })
+    }
 }

@@ -120,9 +120,7 @@ impl Planet {
         assert_eq!(normals.len(), out.len(), "a sample for every normal");
         match &self.body {
             Body::Earthlike(body) => body.samples(normals, out),
-            Body::Cratered(body) => {
-                normals.iter().zip(out).for_each(|(&n, sample)| *sample = body.sample(n));
-            }
+            Body::Cratered(body) => body.samples(normals, out),
         }
     }
 

@@ -6,7 +6,7 @@
 //! Not here: writing the file (the host), reading one (`overfly_config`).
 
 use super::change::number;
-use super::record::{ERRORS, FRAME, RunRecord, times};
+use super::record::{ERRORS, FRAME, INSTRUCTIONS, RunRecord, times};
 use super::statistic::take;
 use overfly_config::Statistic;
 use std::fmt::Write;
@@ -58,8 +58,9 @@ pub fn budget_text(record: &RunRecord) -> String {
             line(&mut out, (name, statistic, None), (column, COUNTS_FACTOR), record);
         }
     }
-    for name in [ERRORS[0], ERRORS[3]] {
-        let column = record.errors.columns.get(name).map_or(&[][..], Vec::as_slice);
+    for name in [ERRORS[0], ERRORS[3], INSTRUCTIONS] {
+        let sampled = record.sampled(name).and_then(|sampled| sampled.columns.get(name));
+        let column = sampled.map_or(&[][..], Vec::as_slice);
         line(&mut out, (name, "max", None), (column, COUNTS_FACTOR), record);
     }
     for name in times() {

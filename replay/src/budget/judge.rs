@@ -9,7 +9,7 @@
 //! it holds in every run, is broken where it is broken in every run, and else nobody knows.
 
 use super::change::{Change, number};
-use super::record::{DIGESTS, ERRORS, Facts, RunRecord, counters, times};
+use super::record::{DIGESTS, ERRORS, Facts, INSTRUCTIONS, RunRecord, counters, times};
 use super::statistic::{Taken, take};
 use overfly_config::{BudgetLine, BudgetNames, BudgetSettings, Severity, Statistic};
 
@@ -75,6 +75,7 @@ pub struct Verdict {
 pub fn known_names() -> [Vec<&'static str>; 3] {
     let mut counted = counters();
     counted.extend(ERRORS);
+    counted.push(INSTRUCTIONS);
     [counted, times(), DIGESTS.into()]
 }
 
@@ -105,6 +106,8 @@ pub fn judge(
         lines.any(|line| line.of == of && line.statistic == Statistic::Changed)
     };
     let [counted, _, digests] = known_names();
+    // Another compiler gives other instructions for the same work.
+    let counted = counted.into_iter().filter(|of| *of != INSTRUCTIONS);
     for of in digests.into_iter().chain(counted).filter(|of| !own(of)) {
         let (statistic, severity) = (Statistic::Changed, Severity::Fail);
         let line = BudgetLine { of, statistic, over: None, limit: 0.0, severity };
@@ -187,16 +190,14 @@ fn skipped(line: &BudgetLine, why: &str) -> Verdict {
 /// A line of counts or of errors.
 fn counted(record: &RunRecord, line: &BudgetLine) -> Verdict {
     let over = line.over.unwrap_or(0.0);
-    let sampled = ERRORS.contains(&line.of);
-    let from = if sampled { &record.errors.columns } else { &record.counters };
+    let sampled = record.sampled(line.of);
+    let from = sampled.map_or(&record.counters, |sampled| &sampled.columns);
     let column = from.get(line.of).map_or(&[][..], Vec::as_slice);
     let Some(taken) = take(line.statistic, over, column, record.facts.rate_hz) else {
         return skipped(line, "no frame was measured");
     };
-    let frame = match record.errors.frames.get(taken.worst) {
-        Some(&frame) if sampled => frame as usize,
-        _ => taken.worst,
-    };
+    let frame = sampled.and_then(|sampled| sampled.frames.get(taken.worst));
+    let frame = frame.map_or(taken.worst, |&frame| frame as usize);
     let holds = taken.value <= line.limit;
     let status = if holds { Status::Pass } else { broken(line.severity) };
     let mut verdict = verdict(line, vec![taken.value], status);
@@ -284,11 +285,11 @@ pub fn change(of: &str, records: [&RunRecord; 2]) -> Option<Change> {
     if let [Some(a), Some(b)] = records.map(|record| record.counters.get(of)) {
         return Change::of_counts(of, [a, b]);
     }
-    let [Some(a), Some(b)] = records.map(|record| record.errors.columns.get(of)) else {
+    let [Some(a), Some(b)] = records.map(|record| record.sampled(of)?.columns.get(of)) else {
         return None;
     };
     let mut change = Change::of_counts(of, [a, b])?;
-    let frames = &records[1].errors.frames;
+    let frames = &records[1].sampled(of)?.frames;
     change.first = frames[change.first] as usize;
     change.most = frames[change.most] as usize;
     Some(change)

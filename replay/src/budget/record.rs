@@ -20,6 +20,8 @@ pub const FRAME: &str = "frame";
 pub const MORE_COUNTERS: [&str; 3] = ["draws", "uploaded_bytes", "queue_depth"];
 /// Columns of the sampled frames: measured error, promised bound, the one over the other.
 pub const ERRORS: [&str; 4] = ["e1_max_px", "e1_rms_px", "bound_px", "e5"];
+/// Column of the frames whose instructions were counted.
+pub const INSTRUCTIONS: &str = "instructions";
 /// Names of the digests, in pipeline order.
 pub const DIGESTS: [&str; 4] = ["digest.pages", "digest.mesh", "digest.vertices", "digest.draws"];
 const _: () = assert!(DIGESTS.len() == FrameDigest::STAGES.len());
@@ -62,6 +64,9 @@ pub struct RunRecord {
     pub times_ns: Vec<BTreeMap<String, Vec<u64>>>,
     /// Errors of a few frames. Its columns are empty where none was measured.
     pub errors: Sampled,
+    /// Instructions of a few frames, done by their caller alone. Empty where none were counted.
+    #[serde(default, skip_serializing_if = "Sampled::is_empty")]
+    pub instructions: Sampled,
     /// Height of the ground beneath the eye above the ellipsoid in metres, of a few frames.
     pub ground: Sampled,
     /// The first count of a later run that differed from the first run's.
@@ -123,6 +128,13 @@ pub struct Sampled {
     pub frames: Vec<u32>,
     /// Their values by name.
     pub columns: BTreeMap<String, Vec<f64>>,
+}
+
+impl Sampled {
+    /// Whether there is no frame.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
 }
 
 /// A count that was not the same in two runs of one flight.
@@ -190,6 +202,7 @@ impl RunRecord {
             digests: DIGESTS.iter().map(|name| ((*name).to_owned(), Vec::new())).collect(),
             times_ns: Vec::new(),
             errors: Sampled::default(),
+            instructions: Sampled::default(),
             ground: Sampled::default(),
             odd: None,
         }
@@ -221,7 +234,7 @@ impl RunRecord {
         if let Some((column, found)) = lengths.into_iter().find(|(_, length)| *length != frames) {
             return Err(RecordFault::Length { column, found, frames });
         }
-        for sampled in [&self.errors, &self.ground] {
+        for sampled in [&self.errors, &self.instructions, &self.ground] {
             let frames = sampled.frames.len();
             let odd = sampled.columns.iter().find(|(_, column)| column.len() != frames);
             if let Some((column, values)) = odd {
@@ -244,6 +257,15 @@ impl RunRecord {
             of(&self.height_m),
             of(&self.time_s)
         )
+    }
+
+    /// The columns of few frames that hold a name; none where it is counted in every frame.
+    pub fn sampled(&self, of: &str) -> Option<&Sampled> {
+        match of {
+            INSTRUCTIONS => Some(&self.instructions),
+            _ if ERRORS.contains(&of) => Some(&self.errors),
+            _ => None,
+        }
     }
 
     /// Times of a name in milliseconds, one column for each run.

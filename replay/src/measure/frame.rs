@@ -100,6 +100,41 @@ struct Last {
     stays: bool,
 }
 
+/// What is told of a frame beside its mesh.
+#[derive(Clone, Copy)]
+struct Shown {
+    camera: Camera,
+    bound_px: f64,
+    triangles: u32,
+}
+
+impl Shown {
+    fn of(output: &FrameOutput) -> Self {
+        let counts = &output.counts;
+        let (bound_px, triangles) = (counts.error_px_bound, counts.triangles);
+        Self { camera: output.views[0].camera, bound_px, triangles }
+    }
+}
+
+/// A frame as it was drawn, apart from its terrain: that may run on while this is measured.
+pub struct Taken {
+    mesh: MeshThen,
+    shown: Option<Shown>,
+}
+
+impl Taken {
+    /// None yet, of terrains over a body.
+    pub fn new(body: Ellipsoid) -> Self {
+        Self { mesh: MeshThen::new(body), shown: None }
+    }
+
+    /// Takes the first view of the frame that a terrain has just run.
+    pub fn take(&mut self, terrain: &Terrain, output: &FrameOutput) {
+        self.mesh.take(terrain, output.time_ms);
+        self.shown = Some(Shown::of(output));
+    }
+}
+
 /// Measures the frames of a flight.
 pub struct Measure {
     pub(super) settings: MeasureSettings,
@@ -114,6 +149,8 @@ pub struct Measure {
     then: Option<Screen>,
     /// The picture of the frame that was taken last.
     seen: Option<Screen>,
+    /// What was told of it, if it came apart from its terrain.
+    shown: Option<Shown>,
     /// What the rays of the frame that was measured last meet of the mesh.
     pub raster: Raster,
     pub(super) found: Vec<Found>,
@@ -134,6 +171,7 @@ impl Measure {
             before: MeshThen::new(scene.body),
             then: None,
             seen: None,
+            shown: None,
             raster: Raster::default(),
             found: Vec::new(),
             grid: None,
@@ -160,6 +198,16 @@ impl Measure {
         self.then = self.seen.replace(Screen::new(&output.views[0].camera));
     }
 
+    /// The same for a frame that was taken apart from its terrain; another one is handed back, of
+    /// which only the memory counts.
+    pub fn accept(&mut self, taken: &mut Taken) {
+        std::mem::swap(&mut self.now, &mut self.before);
+        std::mem::swap(&mut self.now, &mut taken.mesh);
+        self.shown = taken.shown.take();
+        let shown = self.shown.as_ref().expect("a frame was taken");
+        self.then = self.seen.replace(Screen::new(&shown.camera));
+    }
+
     /// Nothing pops from the last frame to the next: other frames lie between, or the camera was
     /// cut.
     pub fn cut(&mut self) {
@@ -180,6 +228,16 @@ impl Measure {
         self.judge((terrain, output), frame, make, flight)
     }
 
+    /// Whether the next frame is one of those in which the costly metrics are measured, which need
+    /// its terrain.
+    pub fn needs_terrain(&self) -> bool {
+        self.is_due(self.settings.thorough_every)
+    }
+
+    fn is_due(&self, every: u64) -> bool {
+        every > 0 && self.measured.is_multiple_of(every)
+    }
+
     /// Measures the frame whose mesh was taken last: [`Self::now`] is what is judged.
     pub fn judge(
         &mut self,
@@ -188,15 +246,38 @@ impl Measure {
         make: MakePage<'_>,
         flight: &mut FlightErrors,
     ) -> bool {
-        let camera = &output.views[0].camera;
+        self.judge_shown(Shown::of(output), Some((terrain, output)), (frame, make), flight)
+    }
+
+    /// Measures the frame that was [accepted](Self::accept) last, which [needs no
+    /// terrain](Self::needs_terrain).
+    pub fn judge_accepted(
+        &mut self,
+        frame: u64,
+        make: MakePage<'_>,
+        flight: &mut FlightErrors,
+    ) -> bool {
+        assert!(!self.needs_terrain(), "this frame's costly metrics are due");
+        let shown = self.shown.take().expect("a frame was accepted");
+        self.judge_shown(shown, None, (frame, make), flight)
+    }
+
+    fn judge_shown(
+        &mut self,
+        Shown { camera, bound_px, triangles }: Shown,
+        whole: Option<(&Terrain, &FrameOutput)>,
+        (frame, make): (u64, MakePage<'_>),
+        flight: &mut FlightErrors,
+    ) -> bool {
+        let camera = &camera;
         let screen = Screen::new(camera);
         let grid = Grid::new(screen.size_px, self.settings.rays, (self.settings.seed, frame));
         self.grid = Some(grid);
         let mut errors = FrameErrors {
             frame,
-            bound_px: output.counts.error_px_bound,
+            bound_px,
             rays: grid.len() as u64,
-            mesh_triangles: u64::from(output.counts.triangles),
+            mesh_triangles: u64::from(triangles),
             ..FrameErrors::default()
         };
         self.place_eye(camera, &mut errors);
@@ -217,10 +298,12 @@ impl Measure {
         errors.triangles = u64::from(self.raster.triangles);
         self.gather(&grid, &mut errors, flight);
         self.count_holes((&screen, &grid), make, &mut errors);
-        let due = |every: u64| every > 0 && self.measured.is_multiple_of(every);
-        let due = [due(self.settings.thorough_every), due(self.settings.cross_every)];
-        let shot = thorough::Shot { terrain, output, screen, grid, make, frame };
-        errors.thorough = thorough::measure(self, &shot, due);
+        let due = [self.settings.thorough_every, self.settings.cross_every];
+        let due = due.map(|every| self.is_due(every));
+        errors.thorough = whole.and_then(|(terrain, output)| {
+            let shot = thorough::Shot { terrain, output, screen, grid, make, frame };
+            thorough::measure(self, &shot, due)
+        });
         if self.is_stopped() {
             return false;
         }

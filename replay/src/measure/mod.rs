@@ -44,6 +44,6 @@ pub mod thorough;
 pub mod wide;
 
 pub use errors::{FlightErrors, FrameErrors, Thorough};
-pub use frame::{Measure, MeasureSettings};
+pub use frame::{Measure, MeasureSettings, Taken};
 pub use reference::{MakePage, PagePart};
 pub use spread::{Gathered, Spread, Where};

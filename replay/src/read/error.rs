@@ -151,7 +151,7 @@ impl fmt::Display for ReadError {
             Self::Version { file, found } => {
                 write!(
                     f,
-                    "{file}: at byte 8: expected version 1 to {VERSION}, found version {found}"
+                    "{file}: at byte 8: expected version 1, 2 or {VERSION}, found version {found}"
                 )
             }
             Self::Kind { file, expected, found } => {

@@ -28,6 +28,8 @@ pub struct Plan {
     pub flight: String,
     /// Preset or path, for people.
     pub scene_name: String,
+    /// As it was asked for.
+    pub scene_given: Option<String>,
     pub scene: SceneSettings,
     pub manner: Manner,
     /// All where there is none.

@@ -26,7 +26,8 @@ A budget is RON; `--init` writes one from a run, with head-room stated:
       (of: \"digest.mesh\", statistic: \"changed\", limit: 0),               // with --baseline
   ])
   of: a counter or stage (names are those of frames.csv), frame, e1_max_px, e1_rms_px, bound_px,
-      e5 (measured error over promised bound), digest.pages, .mesh, .vertices, .draws
+      e5 (measured error over promised bound), instructions (with --instructions N),
+      digest.pages, .mesh, .vertices, .draws
   statistic: sum, mean, p50, p95, p99, p99.9, max, share_over, longest_run_over, hitches_per_min
       (the last three with `over`), changed (frames that differ from the baseline)
 
@@ -46,7 +47,8 @@ Examples:
   overfly budget rainier --frames 0..600 --counters-only --baseline base.json
   overfly budget rainier --frames 0..1200 --against ./overfly-main
   overfly budget rainier --frames 0..1200 --scene my.ron --against-scene earth
-  overfly budget rainier --frames 0..1200 --calibrate";
+  overfly budget rainier --frames 0..1200 --calibrate
+  overfly budget rainier --frames 0..60 --instructions 60 --record run.json";
 
 /// What `budget` takes.
 #[derive(clap::Args)]
@@ -109,6 +111,11 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 2,
           value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub errors: u32,
+    /// Counts the instructions of the first N frames in a run under valgrind, some fifty times slower:
+    /// `instructions` in budgets. They tell on a busy machine what times cannot.
+    #[arg(long, value_name = "N", default_value_t = 0,
+          value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub instructions: u32,
     /// Pairs of runs: at least A, at most B; from 3 to 1000.
     #[arg(long, value_name = "A..B", default_value = "6..40", value_parser = parse_pairs)]
     pub pairs: (usize, usize),

@@ -9,8 +9,11 @@ use glam::DVec3;
 
 use super::bounds::{Bounds, Growth, SMOOTH, Term};
 use super::craters::{Craters, Dent};
+use super::lanes::BLOCK;
 use super::noise::{Lattice, PEAK, mix, ramp};
 use super::{Layers, ProceduralSettings, Sample, byte};
+
+mod block;
 
 /// The cratered planet.
 pub(super) struct Cratered {
@@ -33,6 +36,27 @@ struct Octave {
     craters: Option<Craters>,
     /// Share of the craters' depth that is left on the smoothest ground.
     in_maria: f64,
+}
+
+/// The longest waves at one point.
+#[derive(Clone, Copy)]
+struct Plain {
+    height_m: f64,
+    /// Above the level of maria where it is large.
+    pool: f64,
+    /// 0 in highlands, 1 in maria.
+    mare: f64,
+    ruggedness: f64,
+}
+
+/// Octaves and craters at one point while they are being piled up.
+#[derive(Clone, Copy)]
+struct Pile {
+    height_m: f64,
+    dents_m: f64,
+    fresh: f64,
+    /// What the octaves bend the shores of maria by.
+    shore: f64,
 }
 
 const MOON_RADIUS_M: f64 = 1_737_400.0;
@@ -85,33 +109,48 @@ impl Cratered {
 
     pub(super) fn sample(&self, n: DVec3) -> Sample {
         let at_m = n * self.radius_m;
-        let swell = 0.6 * self.swell[0].value(at_m) + 0.4 * self.swell[1].value(at_m);
-        let pool = self.maria[0].value(at_m) + 0.22 * self.maria[1].value(at_m) - 0.6 * swell;
-        let mare = ramp(0.24, 0.36, pool);
-        let ruggedness = 1.0 - (1.0 - MARE) * mare;
-        let mut height_m = self.vertical * (SWELL_M * swell - MARE_DEPTH_M * mare);
-        let mut dents_m = 0.0;
-        let mut fresh = 0.0;
-        let mut shore = 0.0;
+        let swell = [0, 1].map(|k: usize| self.swell[k].value(at_m));
+        let maria = [0, 1].map(|k: usize| self.maria[k].value(at_m));
+        let plain = self.plain(swell, maria);
+        let mut pile = Pile::on(&plain);
         for (i, octave) in self.octaves.iter().enumerate() {
             let value = octave.ground.value(at_m);
-            shore += if (1..5).contains(&i) { 0.03 * value } else { 0.0 };
-            height_m += octave.amplitude_m * ruggedness * value;
+            pile.raise(octave, i, plain.ruggedness, value);
             let Some(craters) = &octave.craters else { continue };
-            let Dent { height_m: dent_m, fresh: bright } = craters.at(at_m, n, value);
-            let left = octave.in_maria + (1.0 - octave.in_maria) * (1.0 - mare);
-            dents_m += self.relief * left * dent_m;
-            fresh += bright * left;
+            pile.dent(octave, self.relief, plain.mare, &craters.at(at_m, n, value));
         }
-        height_m += dents_m.clamp(self.craters_m[0], self.craters_m[1]);
-        let dark = ramp(0.28, 0.32, pool + shore);
+        self.finished(n, &plain, &pile)
+    }
+
+    /// [`Cratered::sample`] of many points, bit for bit.
+    pub(super) fn samples(&self, normals: &[DVec3], out: &mut [Sample]) {
+        for (normals, out) in normals.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            block::fill(self, normals, out);
+        }
+    }
+
+    /// The ground before octaves and craters, by the noise of swell and maria.
+    #[inline(always)]
+    fn plain(&self, swell: [f64; 2], maria: [f64; 2]) -> Plain {
+        let swell = 0.6 * swell[0] + 0.4 * swell[1];
+        let pool = maria[0] + 0.22 * maria[1] - 0.6 * swell;
+        let mare = ramp(0.24, 0.36, pool);
+        let ruggedness = 1.0 - (1.0 - MARE) * mare;
+        let height_m = self.vertical * (SWELL_M * swell - MARE_DEPTH_M * mare);
+        Plain { height_m, pool, mare, ruggedness }
+    }
+
+    #[inline(always)]
+    fn finished(&self, n: DVec3, plain: &Plain, pile: &Pile) -> Sample {
+        let height_m = pile.height_m + pile.dents_m.clamp(self.craters_m[0], self.craters_m[1]);
+        let dark = ramp(0.28, 0.32, plain.pool + pile.shore);
         let layers = Layers {
-            roughness: byte(ruggedness),
-            rock: byte(0.35 * (1.0 - dark) + 0.55 * fresh),
+            roughness: byte(plain.ruggedness),
+            rock: byte(0.35 * (1.0 - dark) + 0.55 * pile.fresh),
             moisture: byte(dark),
             temperature: byte((60.0 - 70.0 * n.z * n.z) / 80.0),
         };
-        Sample { height_m, layers, ruggedness }
+        Sample { height_m, layers, ruggedness: plain.ruggedness }
     }
 
     fn bounds(&self, size: f64) -> Bounds {
@@ -146,6 +185,28 @@ impl Cratered {
             ruggedness_slope_per_m: RUGGEDNESS_SLOPE_PER_KM / km,
             terms,
         }
+    }
+}
+
+impl Pile {
+    #[inline(always)]
+    fn on(plain: &Plain) -> Pile {
+        Pile { height_m: plain.height_m, dents_m: 0.0, fresh: 0.0, shore: 0.0 }
+    }
+
+    /// Adds the `i`-th octave's ground.
+    #[inline(always)]
+    fn raise(&mut self, octave: &Octave, i: usize, ruggedness: f64, value: f64) {
+        self.shore += if (1..5).contains(&i) { 0.03 * value } else { 0.0 };
+        self.height_m += octave.amplitude_m * ruggedness * value;
+    }
+
+    /// Adds an octave's craters.
+    #[inline(always)]
+    fn dent(&mut self, octave: &Octave, relief: f64, mare: f64, dent: &Dent) {
+        let left = octave.in_maria + (1.0 - octave.in_maria) * (1.0 - mare);
+        self.dents_m += relief * left * dent.height_m;
+        self.fresh += dent.fresh * left;
     }
 }
 
