@@ -307,3 +307,35 @@ fn ctrl_c_keeps_what_was_flown() {
     assert_eq!(run["counters"]["triangles"].as_array().unwrap().len(), frames);
     assert!(frames < 36_001);
 }
+
+/// Two frames of the smallest planet: under valgrind each takes a second or so.
+#[test]
+fn instructions_are_counted_frame_by_frame_where_there_is_valgrind() {
+    let folder = tempfile::tempdir().unwrap();
+    let [run, lines] = ["run.json", "lines.ron"].map(|name| path(folder.path(), name));
+    let line = |limit: f64| {
+        format!("Budget(lines: [(of: \"instructions\", statistic: \"max\", limit: {limit})])")
+    };
+    std::fs::write(&lines, line(1e3)).unwrap();
+    let common = ["budget", "rainier", "--scene", "small", "--frames", "20..22", "--errors", "0"];
+    let common = [&common[..], &["--counters-only", "--budget", &lines]].concat();
+    let unasked = overfly(&common);
+    assert_eq!(unasked.code, 2, "{unasked:?}");
+    assert!(unasked.err.contains("only --instructions N counts"), "{unasked:?}");
+
+    let counting = [&common[..], &["--instructions", "9", "--record", &run]].concat();
+    let without = command().args(&counting).env("PATH", folder.path()).output().unwrap();
+    assert_eq!(without.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&without.stderr).contains("apt install valgrind"));
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        println!("instructions: skipped: no valgrind");
+        return;
+    }
+    let counted = overfly(&counting);
+    assert_eq!(counted.code, 1, "a frame takes more than a thousand: {counted:?}");
+    assert!(counted.out.contains("instructions max is"), "{counted:?}");
+    let run = json(&run);
+    let column = run["instructions"]["columns"]["instructions"].as_array().unwrap();
+    assert_eq!(column.len(), 2, "no more frames are counted than there are");
+    assert!(column.iter().all(|count| (1e4..1e10).contains(&count.as_f64().unwrap())), "{column:?}");
+}
