@@ -40,6 +40,15 @@ pub enum StartError {
         /// Why.
         reason: String,
     },
+    /// What a host lends cannot be drawn with.
+    Host {
+        /// Which field of [`crate::HostDevice`] or [`crate::HostTarget`].
+        field: &'static str,
+        /// What it is.
+        found: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
     /// The driver does not keep float arithmetic as written: terrain would jitter.
     Contracted {
         /// How many of the test's answers were wrong.
@@ -100,6 +109,20 @@ pub enum DrawError {
     Slot {
         /// The slot.
         slot: u32,
+    },
+    /// A host records a frame in flight that its renderer does not have.
+    Frame {
+        /// The host's index of it.
+        found: u32,
+        /// How many the renderer has.
+        frames: u32,
+    },
+    /// A host records a depth range that the frame's view does not have.
+    Range {
+        /// Which one.
+        found: usize,
+        /// How many there are.
+        ranges: usize,
     },
     /// A range draws more patches than the arena has.
     Draws {
@@ -196,6 +219,9 @@ impl fmt::Display for StartError {
                 write!(f, "the Vulkan device cannot draw with depth.format {format}")
             }
             Self::NoSurface { reason } => write!(f, "cannot draw to the window: {reason}"),
+            Self::Host { field, found, allowed } => {
+                write!(f, "the host's {field} is {found}, allowed is {allowed}")
+            }
             Self::Contracted { wrong, of } => write!(
                 f,
                 "the driver reorders float arithmetic: {wrong} of {of} two-sums are wrong"
@@ -226,6 +252,12 @@ impl fmt::Display for DrawError {
                 found.1, found.0, renderer.1, renderer.0
             ),
             Self::Slot { slot } => write!(f, "the view draws slot {slot}, which holds no patch"),
+            Self::Frame { found, frames } => {
+                write!(f, "there is no frame {found} in flight, the renderer has {frames}")
+            }
+            Self::Range { found, ranges } => {
+                write!(f, "there is no depth range {found}, the frame's view has {ranges}")
+            }
             Self::Draws { found, max } => {
                 write!(f, "a range draws {found} patches, the renderer has room for {max}")
             }

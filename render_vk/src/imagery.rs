@@ -20,8 +20,8 @@ use std::sync::Arc;
 
 /// Levels of each layer: 129 texels a side, 64, 32, … 1.
 const LEVELS: u32 = 8;
-/// Tiles copied with one picture; more than that are copied and waited for.
-const TILES_A_PICTURE: usize = 8;
+/// Tiles staged at once; a picture that has more takes more buffers for its time.
+const TILES_STAGED: usize = 8;
 /// Texels of all levels of one tile.
 const TEXELS: usize = {
     let (mut all, mut level) = (0, 0);
@@ -54,11 +54,11 @@ impl TileStaging {
     pub(crate) fn new(device: &Arc<Device>, name: &str) -> Result<Self, Fault> {
         let info = BufferInfo {
             name: &format!("{name}, tiles"),
-            bytes: (TILES_A_PICTURE * TEXELS * size_of::<Texel>()) as u64,
+            bytes: (TILES_STAGED * TEXELS * size_of::<Texel>()) as u64,
             usage: vk::BufferUsageFlags::TRANSFER_SRC,
             location: MemoryLocation::CpuToGpu,
         };
-        let layers = Vec::with_capacity(TILES_A_PICTURE);
+        let layers = Vec::with_capacity(TILES_STAGED);
         Ok(Self { rows: Buffer::new(device, &info)?, layers })
     }
 }

@@ -1,12 +1,13 @@
 //! What the shaders know of a view: eye, rotation, projection, light, time.
 //!
 //! In:    the camera of a view, the parts of the frame, a depth range.
-//! Out:   [`ViewTerms`], a uniform block; [`RangeTerms`], push constants.
+//! Out:   [`ViewTerms`], a uniform block; [`RangeTerms`], push constants; [`projection`] for hosts.
 //! Keeps: nothing.
 //! Not here: the shaders' side of the same blocks (`shaders/view.wgsl`).
 
 use crate::picture::{Picture, Show};
 use glam::DVec3;
+use overfly_core::frame::data::ViewDraws;
 use overfly_core::geodesy::narrow;
 use overfly_core::settings::DepthOrder;
 
@@ -123,6 +124,25 @@ impl RangeTerms {
     }
 }
 
+/// The projection of one depth range of a view, as the ground is drawn with it: from eye space
+/// (x right, y up, z backward, metres) to Vulkan's clip space (y down, z from 0 to w). Columns, as
+/// shaders take them; `None` without such a range.
+///
+/// A host draws its own geometry with it after the range's ground, with the same order of depth:
+/// `DepthOrder::Reversed` compares with `GREATER`. A point's z and w are the ground's to the last
+/// bit; only what is between the range's `near_m` and `far_m` is seen.
+pub fn projection(view: &ViewDraws, range: usize, order: DepthOrder) -> Option<[[f32; 4]; 4]> {
+    let found = view.ranges.get(range)?;
+    let terms = RangeTerms::new(order, [found.near_m, found.far_m], range);
+    let [x, y] = view.camera.half_tangents.map(|tangent| narrow(1.0 / tangent));
+    Some([
+        [x, 0.0, 0.0, 0.0],
+        [0.0, -y, 0.0, 0.0],
+        [0.0, 0.0, -terms.slope, -1.0],
+        [0.0, 0.0, terms.offset, 0.0],
+    ])
+}
+
 fn narrowed(v: DVec3) -> [f32; 3] {
     [narrow(v.x), narrow(v.y), narrow(v.z)]
 }
@@ -130,6 +150,10 @@ fn narrowed(v: DVec3) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use overfly_core::camera::{Camera, View};
+    use overfly_core::frame::data::RangeDraws;
+    use overfly_core::geodesy::{Ecef, Ellipsoid};
+    use overfly_core::units::Radians;
 
     fn depth(terms: &RangeTerms, w: f32) -> f32 {
         (terms.slope * w + terms.offset) / w
@@ -155,5 +179,39 @@ mod tests {
         let infinite = RangeTerms::new(DepthOrder::Forward, [10.0, f64::INFINITY], 0);
         assert_eq!((depth(&infinite, 10.0), infinite.far), (0.0, 1.0));
         assert!(depth(&infinite, 1e5) < 1.0);
+    }
+
+    #[test]
+    fn a_projection_takes_the_corners_of_the_picture_and_the_borders_of_the_range() {
+        let view = View {
+            eye: Ecef(DVec3::X * 7e6),
+            orientation: glam::DQuat::IDENTITY,
+            field_of_view: Radians(1.0),
+            size_px: [200, 100],
+            near_m: 0.5,
+        };
+        let camera = Camera::new(&view, &Ellipsoid::WGS84);
+        let [tan_x, tan_y] = camera.half_tangents.map(narrow);
+        let range = |near_m, far_m| RangeDraws { near_m, far_m, patches: Vec::new() };
+        let ranges = vec![range(0.5, 32.0), range(30.0, f64::INFINITY)];
+        let view = ViewDraws { camera, ranges };
+        for (order, [near, far]) in
+            [(DepthOrder::Reversed, [1.0, 0.0]), (DepthOrder::Forward, [0.0, 1.0])]
+        {
+            let columns = projection(&view, 0, order).unwrap();
+            let clip = |at: [f32; 4]| {
+                let row = |i: usize| (0..4).map(|j| columns[j][i] * at[j]).sum::<f32>();
+                let w = row(3);
+                [row(0) / w, row(1) / w, row(2) / w]
+            };
+            for (away_m, depth) in [(0.5, near), (32.0, far)] {
+                // Right and up in eye space is right and up on a screen whose y runs down.
+                let [x, y, z] = clip([tan_x * away_m, tan_y * away_m, -away_m, 1.0]);
+                let off = [x - 1.0, y + 1.0, z - depth].map(f32::abs);
+                assert!(off.iter().all(|off| *off < 1e-6), "{order:?}, {away_m} m: {off:?}");
+            }
+            assert!(projection(&view, 1, order).is_some());
+            assert_eq!(projection(&view, 2, order), None);
+        }
     }
 }

@@ -39,7 +39,8 @@ pub struct RendererSettings {
     pub tolerance_px: f64,
     /// Keeps the depth of the nearest range for [`crate::Renderer::read_depth`].
     pub keep_depth: bool,
-    /// Pictures that the device may be behind; 1 to 4, usually 2.
+    /// Pictures that the device may be behind; 1 to 16, usually 2. A host's renderer takes as many
+    /// for each view.
     pub frames_in_flight: u32,
     /// Whether to run under the validation layer, with synchronisation checks. Slow.
     pub validation: bool,
@@ -92,7 +93,7 @@ impl RendererSettings {
         for (field, found, max) in [
             ("patches_max", self.patches_max, patches_end),
             ("ranges_max", self.ranges_max, RANGES_MAX),
-            ("frames_in_flight", self.frames_in_flight, 4),
+            ("frames_in_flight", self.frames_in_flight, 16),
         ] {
             if found == 0 || found > max {
                 return refused(field, found.into(), format!("1 to {max}"));

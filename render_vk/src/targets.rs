@@ -11,7 +11,7 @@
 
 use crate::error::{Fault, StartError};
 use crate::vk::image::{Image, ImageInfo};
-use crate::vk::pipeline::{Framebuffer, RenderPass};
+use crate::vk::pipeline::{Framebuffer, RenderPass, Subpass};
 use crate::vk::{Buffer, Device, buffer::BufferInfo};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -39,6 +39,11 @@ impl RangePasses {
         let first = pass(device, ("first range", true), depth, keep_depth)?;
         let next = pass(device, ("next range", false), depth, keep_depth)?;
         Ok(Self { first, next, depth, keep_depth })
+    }
+
+    /// What pipelines for either are made for.
+    pub(crate) fn subpass(&self) -> Subpass {
+        Subpass { pass: self.first.handle, index: 0, samples: vk::SampleCountFlags::TYPE_1 }
     }
 }
 

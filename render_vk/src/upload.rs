@@ -3,7 +3,7 @@
 //! In:    slots built by the frame, the patch arena of core.
 //! Out:   staged vertices and the copies that bring them to the device.
 //! Keeps: buffers of vertices, morphs, drapes and indices, one bit a slot.
-//! Not here: recording the copies (`record`).
+//! Not here: when that is done (`drawing`, `record`).
 
 use crate::error::Fault;
 use crate::settings::RendererSettings;
@@ -15,7 +15,7 @@ use overfly_core::mesh::drape::PatchDrape;
 use overfly_core::mesh::{PatchMorph, PatchVertex, Patches, topology};
 use std::sync::Arc;
 
-/// Vertices staged at once; a frame that has more to upload waits in between.
+/// Vertices staged at once; a frame that has more to upload takes more buffers for its time.
 const STAGING_BYTES: u64 = 4 << 20;
 
 /// Vertices of all patches, as the device has them.
@@ -34,10 +34,16 @@ pub(crate) struct Arena {
 
 /// Copies from one staging buffer to the arena.
 #[derive(Default)]
-pub(crate) struct Copies {
-    pub(crate) vertices: Vec<vk::BufferCopy>,
-    pub(crate) morphs: Vec<vk::BufferCopy>,
-    pub(crate) drapes: Vec<vk::BufferCopy>,
+struct Copies {
+    vertices: Vec<vk::BufferCopy>,
+    morphs: Vec<vk::BufferCopy>,
+    drapes: Vec<vk::BufferCopy>,
+}
+
+/// A buffer with patches that are on their way to the device.
+pub(crate) struct Staging {
+    rows: Buffer,
+    copies: Copies,
 }
 
 impl Copies {
@@ -45,25 +51,6 @@ impl Copies {
         self.vertices.clear();
         self.morphs.clear();
         self.drapes.clear();
-    }
-
-    /// Records them.
-    pub(crate) fn record(
-        &self,
-        device: &Device,
-        buffer: vk::CommandBuffer,
-        (staging, arena): (&Buffer, &Arena),
-    ) {
-        let all = [
-            (Some(&arena.vertices), &self.vertices),
-            (arena.morphs.as_ref(), &self.morphs),
-            (arena.drapes.as_ref(), &self.drapes),
-        ];
-        for (to, regions) in all {
-            if let Some(to) = to.filter(|_| !regions.is_empty()) {
-                transfer::copies(device, buffer, (staging, to), regions);
-            }
-        }
     }
 }
 
@@ -122,18 +109,18 @@ impl Arena {
     }
 
     /// A buffer to stage patches in; holds at least one.
-    pub(crate) fn staging(&self, device: &Arc<Device>, name: &str) -> Result<Buffer, Fault> {
+    pub(crate) fn staging(&self, device: &Arc<Device>, name: &str) -> Result<Staging, Fault> {
         let patch: u64 = self.patch_bytes().iter().sum();
         let others = [self.morphs.as_ref(), self.drapes.as_ref()];
         let others: u64 = others.into_iter().flatten().map(|buffer| buffer.bytes).sum();
         let all = self.vertices.bytes + others;
         let info = BufferInfo {
-            name,
+            name: &format!("{name}, staging"),
             bytes: (STAGING_BYTES.min(all) / patch).max(1) * patch,
             usage: vk::BufferUsageFlags::TRANSFER_SRC,
             location: MemoryLocation::CpuToGpu,
         };
-        Buffer::new(device, &info)
+        Ok(Staging { rows: Buffer::new(device, &info)?, copies: Copies::default() })
     }
 
     /// Bytes of one patch's vertices, of its morphs, of what lies over it.
@@ -159,19 +146,15 @@ impl Arena {
     }
 
     /// Stages live slots that are out of date, in order of slot, until the buffer is full. They
-    /// count as up to date from now on: `copies` must be executed. Vertices are staged from the
+    /// count as up to date from now on: the copies must be executed. Vertices are staged from the
     /// buffer's beginning on, then morphs, then drapes.
-    pub(crate) fn stage(
-        &mut self,
-        patches: &Patches,
-        staging: &mut Buffer,
-        copies: &mut Copies,
-    ) -> Staged {
+    pub(crate) fn stage(&mut self, patches: &Patches, staging: &mut Staging) -> Staged {
+        let Staging { rows, copies } = staging;
         copies.clear();
         let mut staged = Staged::default();
         let [vertices, morphs, drapes] = self.patch_bytes();
-        let room = staging.bytes / (vertices + morphs + drapes);
-        let bytes = staging.mapped_mut();
+        let room = rows.bytes / (vertices + morphs + drapes);
+        let bytes = rows.mapped_mut();
         let mut put = |at: u64, from: &[u8]| {
             let at = usize::try_from(at).expect("staging is mapped, so it fits");
             bytes[at..][..from.len()].copy_from_slice(from);
@@ -201,6 +184,21 @@ impl Arena {
             next = slot + 1;
         }
         staged
+    }
+
+    /// Records the copies of what was staged.
+    pub(crate) fn record(&self, device: &Device, buffer: vk::CommandBuffer, staging: &Staging) {
+        let Staging { rows, copies } = staging;
+        let all = [
+            (Some(&self.vertices), &copies.vertices),
+            (self.morphs.as_ref(), &copies.morphs),
+            (self.drapes.as_ref(), &copies.drapes),
+        ];
+        for (to, regions) in all {
+            if let Some(to) = to.filter(|_| !regions.is_empty()) {
+                transfer::copies(device, buffer, (rows, to), regions);
+            }
+        }
     }
 
     /// The first live slot at or after `next` that is out of date.

@@ -1,6 +1,6 @@
 //! The pipelines that a picture is drawn with.
 //!
-//! In:    render passes, compiled shaders, settings.
+//! In:    a subpass to draw into, compiled shaders, settings.
 //! Out:   [`Passes`].
 //! Keeps: layouts; the pipelines of the plain picture, others once they were asked for.
 //! Not here: recording (`record`).
@@ -14,11 +14,10 @@ use crate::error::Fault;
 use crate::imagery::Imagery;
 use crate::matrices::RangeTerms;
 use crate::settings::RendererSettings;
-use crate::targets::RangePasses;
 use crate::vk::Device;
 use crate::vk::commands::OneOff;
 use crate::vk::descriptors::{Binding, SetLayout};
-use crate::vk::pipeline::{Layout, Pipeline};
+use crate::vk::pipeline::{Layout, Pipeline, Subpass};
 use ash::vk;
 use overfly_core::settings::DepthOrder;
 use std::sync::Arc;
@@ -35,7 +34,7 @@ const _: () = assert!(size_of::<RangeTerms>() == RANGE_BYTES as usize);
 /// What pipelines are made from.
 pub(crate) struct PassInfo<'a> {
     pub(crate) device: &'a Arc<Device>,
-    pub(crate) passes: &'a RangePasses,
+    pub(crate) into: Subpass,
     pub(crate) settings: &'a RendererSettings,
 }
 

@@ -31,7 +31,7 @@ pub(crate) fn pipeline(info: &PassInfo<'_>, layout: &Layout) -> Result<Pipeline,
     let graphics = GraphicsInfo {
         name: "overlay",
         words: [&words, &words],
-        pass: &info.passes.first,
+        into: info.into,
         bindings: &bindings,
         attributes: &attributes,
         cull: vk::CullModeFlags::NONE,

@@ -21,7 +21,7 @@ pub(crate) fn pipeline(info: &PassInfo<'_>, layout: &Layout) -> Result<Pipeline,
     let graphics = GraphicsInfo {
         name: "sky",
         words: [&words, &words],
-        pass: &info.passes.first,
+        into: info.into,
         bindings: &[],
         attributes: &[],
         cull: vk::CullModeFlags::NONE,

@@ -46,7 +46,7 @@ pub(crate) fn pipeline(
     let graphics = GraphicsInfo {
         name: if is_debug { "terrain, debug" } else { "terrain" },
         words: [&shaders::ground(placed, morphs, ground), &shaders::terrain(ground)],
-        pass: &info.passes.first,
+        into: info.into,
         bindings: &bindings,
         attributes: &attributes,
         cull: vk::CullModeFlags::BACK,

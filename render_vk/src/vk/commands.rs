@@ -120,7 +120,8 @@ impl Fence {
             .wait_dst_stage_mask(&stages[..after.len()])
             .signal_semaphores(before)];
         // SAFETY: the buffer is recorded and not pending, the fence is unsignalled and not in use,
-        // and the queue is only reached through a `&mut Renderer`.
+        // and the queue is only reached through a `&mut Renderer`; a host's only while a renderer
+        // is made, for which the host lends it.
         unsafe { self.device.handle.queue_submit(self.device.queue, &submits, self.handle) }
             .map_err(failed("vkQueueSubmit"))?;
         self.pending = true;

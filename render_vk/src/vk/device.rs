@@ -1,11 +1,12 @@
 //! The logical device and its one queue.
 //!
-//! In:    an instance; the best physical device is taken.
+//! In:    an instance, of whose devices the best is taken; or a host's device.
 //! Out:   [`Device`], shared by all owners of objects.
-//! Keeps: device, queue, memory allocator, instance.
+//! Keeps: memory allocator; device, queue and instance, unless they are the host's.
 //! Not here: other objects.
 
-use super::instance::{Instance, Surface, Window};
+use super::host::HostDevice;
+use super::instance::{self, Instance, Surface, Window};
 use super::memory::Memory;
 use crate::error::{Fault, StartError, failed};
 use ash::{ext, khr, vk};
@@ -19,10 +20,20 @@ pub(crate) struct Device {
     pub(crate) queue: vk::Queue,
     pub(crate) family: u32,
     pub(crate) limits: vk::PhysicalDeviceLimits,
+    /// Most anisotropy of samplers; 1 is none.
+    pub(crate) anisotropy_max: f32,
     line: String,
     physical: vk::PhysicalDevice,
     // Last: everything above is destroyed before the instance.
-    instance: Instance,
+    origin: Origin,
+}
+
+/// Whose the device is.
+enum Origin {
+    /// Destroyed on drop, then the instance.
+    Own(Instance),
+    /// The host's, who destroys both.
+    Lent(ash::Instance),
 }
 
 impl Device {
@@ -52,26 +63,62 @@ impl Device {
         // one queue, the device has the features, and the surface's own check found the extension.
         let handle = unsafe { instance.handle.create_device(physical, &info, None) }
             .map_err(failed("vkCreateDevice"))?;
-        let memory = match Memory::new(&instance.handle, physical, &handle) {
+        // SAFETY: queue 0 of the family was created with the device.
+        let queue = unsafe { handle.get_device_queue(family, 0) };
+        let host = HostDevice {
+            instance: instance.handle.clone(),
+            physical_device: physical,
+            device: handle,
+            queue,
+            queue_family: family,
+            api_version: instance.version,
+            features,
+            debug_utils: instance.has_names,
+        };
+        let device = Self::over(&host, Origin::Own(instance))?;
+        device.name(device.queue, "queue");
+        Ok(device)
+    }
+
+    /// A host's device, which stays the host's.
+    ///
+    /// # Safety
+    /// - As [`crate::HostRenderer::new`] has it of the device.
+    pub(crate) unsafe fn lent(host: &HostDevice) -> Result<Self, StartError> {
+        // SAFETY: the caller's promise.
+        unsafe { host.check() }?;
+        Self::over(host, Origin::Lent(host.instance.clone()))
+    }
+
+    /// Takes over what `host` names, which is good and of `origin`.
+    fn over(host: &HostDevice, origin: Origin) -> Result<Self, StartError> {
+        let (instance, physical) = (&host.instance, host.physical_device);
+        let memory = match Memory::new(instance, physical, &host.device) {
             Ok(memory) => memory,
             Err(fault) => {
-                // SAFETY: nothing was made from the device yet.
-                unsafe { handle.destroy_device(None) };
+                if matches!(origin, Origin::Own(_)) {
+                    // SAFETY: nothing was made from the device yet.
+                    unsafe { host.device.destroy_device(None) };
+                }
                 return Err(fault.into());
             }
         };
-        // SAFETY: queue 0 of the family was created with the device.
-        let queue = unsafe { handle.get_device_queue(family, 0) };
-        let names =
-            instance.has_names.then(|| ext::debug_utils::Device::new(&instance.handle, &handle));
-        let about = instance.info(physical);
-        let line = format!("{}, {}, Vulkan {}", about.name, about.driver, about.api_version);
-        let limits = instance.properties(physical).limits;
-        let memory = ManuallyDrop::new(memory);
-        let device =
-            Self { memory, names, handle, queue, family, limits, line, physical, instance };
-        device.name(device.queue, "queue");
-        Ok(device)
+        let names = || ext::debug_utils::Device::new(instance, &host.device);
+        let about = instance::info(instance, host.api_version, physical);
+        let limits = instance::properties(instance, physical).limits;
+        let anisotropic = host.features.sampler_anisotropy == vk::TRUE;
+        Ok(Self {
+            memory: ManuallyDrop::new(memory),
+            names: host.debug_utils.then(names),
+            handle: host.device.clone(),
+            queue: host.queue,
+            family: host.queue_family,
+            anisotropy_max: if anisotropic { limits.max_sampler_anisotropy } else { 1.0 },
+            limits,
+            line: format!("{}, {}, Vulkan {}", about.name, about.driver, about.api_version),
+            physical,
+            origin,
+        })
     }
 
     /// Name, driver and API version.
@@ -81,35 +128,44 @@ impl Device {
 
     /// Where pictures are presented, if there is a window.
     pub(crate) fn surface(&self) -> Option<&Surface> {
-        self.instance.surface.as_ref()
+        match &self.origin {
+            Origin::Own(instance) => instance.surface.as_ref(),
+            Origin::Lent(_) => None,
+        }
     }
 
     /// The Vulkan functions that belong to the instance, and the physical device.
     pub(crate) fn instance(&self) -> (&ash::Instance, vk::PhysicalDevice) {
-        (&self.instance.handle, self.physical)
+        match &self.origin {
+            Origin::Own(instance) => (&instance.handle, self.physical),
+            Origin::Lent(instance) => (instance, self.physical),
+        }
     }
 
     /// Whether the device is a program on the host's processor.
     pub(crate) fn is_software(&self) -> bool {
-        self.instance.properties(self.physical).device_type == vk::PhysicalDeviceType::CPU
+        let (instance, physical) = self.instance();
+        instance::properties(instance, physical).device_type == vk::PhysicalDeviceType::CPU
     }
 
     /// What the device can do with optimally tiled images of a format.
     pub(crate) fn image_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let (instance, physical) = self.instance();
-        // SAFETY: the physical device belongs to the instance.
-        unsafe { instance.get_physical_device_format_properties(physical, format) }
-            .optimal_tiling_features
+        instance::image_features(instance, physical, format)
     }
 
-    /// Messages of the validation layer so far.
+    /// Messages of the validation layer so far; none of a host's, who has its own.
     pub(crate) fn messages(&self) -> Vec<String> {
-        self.instance.messages()
+        match &self.origin {
+            Origin::Own(instance) => instance.messages(),
+            Origin::Lent(_) => Vec::new(),
+        }
     }
 
     /// Waits until the queue has nothing left to do.
     pub(crate) fn wait_idle(&self) -> Result<(), Fault> {
-        // SAFETY: the queue is only used through a `&mut Renderer`, so no submit runs meanwhile.
+        // SAFETY: only a renderer with a device of its own waits so, and its queue is only used
+        // through a `&mut Renderer`, so no submit runs meanwhile.
         unsafe { self.handle.device_wait_idle() }.map_err(failed("vkDeviceWaitIdle"))
     }
 }
@@ -119,7 +175,7 @@ fn choose(instance: &Instance) -> Result<(vk::PhysicalDevice, u32), StartError> 
     let mut best: Option<(u32, vk::PhysicalDevice, u32)> = None;
     let mut newest = 0;
     for physical in instance.physical_devices()? {
-        let properties = instance.properties(physical);
+        let properties = instance::properties(&instance.handle, physical);
         newest = newest.max(properties.api_version);
         let rank = match properties.device_type {
             vk::PhysicalDeviceType::DISCRETE_GPU => 4,
@@ -136,7 +192,7 @@ fn choose(instance: &Instance) -> Result<(vk::PhysicalDevice, u32), StartError> 
     match best {
         Some((_, physical, family)) => Ok((physical, family)),
         None if newest > 0 && newest < vk::API_VERSION_1_1 => {
-            Err(StartError::TooOld { found: super::instance::version_text(newest) })
+            Err(StartError::TooOld { found: instance::version_text(newest) })
         }
         None => Err(StartError::NoDevice),
     }
@@ -165,7 +221,9 @@ impl Drop for Device {
         // memory is dropped once, here, before the device that its blocks belong to.
         unsafe {
             ManuallyDrop::drop(&mut self.memory);
-            self.handle.destroy_device(None);
+            if matches!(self.origin, Origin::Own(_)) {
+                self.handle.destroy_device(None);
+            }
         }
     }
 }

@@ -216,9 +216,8 @@ impl Sampler {
         anisotropy: f32,
         beyond: vk::SamplerAddressMode,
     ) -> Result<Self, Fault> {
-        // The limit is 1 on devices without the feature; the others have it switched on.
-        let most = device.limits.max_sampler_anisotropy;
-        let anisotropy = if device.is_software() { 1.0 } else { anisotropy.min(most) };
+        let most = if device.is_software() { 1.0 } else { device.anisotropy_max };
+        let anisotropy = anisotropy.min(most);
         let info = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
             .min_filter(vk::Filter::LINEAR)

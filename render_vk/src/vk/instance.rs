@@ -40,7 +40,8 @@ pub(crate) struct Instance {
     pub(crate) handle: ash::Instance,
     /// Whether objects can be named.
     pub(crate) has_names: bool,
-    version: u32,
+    /// Newest Vulkan of loader and instance.
+    pub(crate) version: u32,
     // Last: unloads the library.
     _entry: ash::Entry,
 }
@@ -99,7 +100,8 @@ pub fn layers() -> Result<Vec<String>, StartError> {
 /// [`StartError::NoLibrary`] without a Vulkan loader, [`StartError::NoDevice`] without a driver.
 pub fn devices() -> Result<Vec<DeviceInfo>, StartError> {
     let instance = Instance::new(false, None)?;
-    Ok(instance.physical_devices()?.into_iter().map(|d| instance.info(d)).collect())
+    let info = |device| info(&instance.handle, instance.version, device);
+    Ok(instance.physical_devices()?.into_iter().map(info).collect())
 }
 
 impl Instance {
@@ -154,36 +156,56 @@ impl Instance {
             Err(result) => Err(failed("vkEnumeratePhysicalDevices")(result).into()),
         }
     }
+}
 
-    pub(crate) fn properties(&self, device: vk::PhysicalDevice) -> vk::PhysicalDeviceProperties {
-        // SAFETY: the device belongs to this instance, which is alive.
-        unsafe { self.handle.get_physical_device_properties(device) }
+/// What the driver says of a device of the instance.
+pub(crate) fn properties(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+) -> vk::PhysicalDeviceProperties {
+    // SAFETY: the device belongs to the instance, which is alive: whoever lends them says so.
+    unsafe { instance.get_physical_device_properties(device) }
+}
+
+/// What a device of the instance can do with optimally tiled images of a format.
+pub(crate) fn image_features(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+    format: vk::Format,
+) -> vk::FormatFeatureFlags {
+    // SAFETY: the device belongs to the instance, which is alive: whoever lends them says so.
+    unsafe { instance.get_physical_device_format_properties(device, format) }
+        .optimal_tiling_features
+}
+
+/// A device of an instance that was made for Vulkan `version`.
+pub(crate) fn info(
+    instance: &ash::Instance,
+    version: u32,
+    device: vk::PhysicalDevice,
+) -> DeviceInfo {
+    let properties = properties(instance, device);
+    let text = |name: Result<&CStr, _>| {
+        name.map(|n: &CStr| n.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    if version.min(properties.api_version) >= vk::API_VERSION_1_2 {
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        // SAFETY: instance and device have Vulkan 1.2, which knows both structures.
+        unsafe { instance.get_physical_device_properties2(device, &mut all) };
     }
-
-    pub(crate) fn info(&self, device: vk::PhysicalDevice) -> DeviceInfo {
-        let properties = self.properties(device);
-        let text = |name: Result<&CStr, _>| {
-            name.map(|n: &CStr| n.to_string_lossy().into_owned()).unwrap_or_default()
-        };
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        if self.version.min(properties.api_version) >= vk::API_VERSION_1_2 {
-            let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
-            // SAFETY: instance and device have Vulkan 1.2, which knows both structures.
-            unsafe { self.handle.get_physical_device_properties2(device, &mut all) };
-        }
-        let [name, info] = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
-        DeviceInfo {
-            name: text(properties.device_name_as_c_str()),
-            kind: match properties.device_type {
-                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-                vk::PhysicalDeviceType::CPU => "cpu",
-                _ => "other",
-            },
-            driver: format!("{} {}", text(name), text(info)).trim().to_owned(),
-            api_version: version_text(properties.api_version),
-        }
+    let [name, info] = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()];
+    DeviceInfo {
+        name: text(properties.device_name_as_c_str()),
+        kind: match properties.device_type {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+            vk::PhysicalDeviceType::CPU => "cpu",
+            _ => "other",
+        },
+        driver: format!("{} {}", text(name), text(info)).trim().to_owned(),
+        api_version: version_text(properties.api_version),
     }
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod buffer;
 pub(crate) mod commands;
 pub(crate) mod descriptors;
 pub(crate) mod device;
+pub(crate) mod host;
 pub(crate) mod image;
 pub(crate) mod instance;
 pub(crate) mod memory;

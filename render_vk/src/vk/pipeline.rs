@@ -124,12 +124,20 @@ impl Drop for Shader {
     }
 }
 
+/// What pipelines draw into: a subpass with one colour attachment and depth.
+#[derive(Clone, Copy)]
+pub(crate) struct Subpass {
+    pub(crate) pass: vk::RenderPass,
+    pub(crate) index: u32,
+    pub(crate) samples: vk::SampleCountFlags,
+}
+
 /// What differs between the graphics pipelines.
 pub(crate) struct GraphicsInfo<'a> {
     pub(crate) name: &'a str,
     /// Modules of the entry points `vertex` and `fragment`.
     pub(crate) words: [&'a [u32]; 2],
-    pub(crate) pass: &'a RenderPass,
+    pub(crate) into: Subpass,
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
     pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
     pub(crate) cull: vk::CullModeFlags,
@@ -176,7 +184,7 @@ impl Pipeline {
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+            .rasterization_samples(info.into.samples);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(info.depth_compare.is_some())
             .depth_write_enable(info.depth_write)
@@ -200,7 +208,8 @@ impl Pipeline {
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
             .layout(layout.handle)
-            .render_pass(info.pass.handle);
+            .render_pass(info.into.pass)
+            .subpass(info.into.index);
         let cache = vk::PipelineCache::null();
         // SAFETY: layout, pass and shaders are this device's and alive, and everything `create`
         // points to outlives the call.
