@@ -104,22 +104,32 @@ impl Drawing {
     ) -> Option<Result<DrawReport, DrawError>> {
         let Self { renderer, parts, looks, infos, .. } = self;
         let renderer = renderer.as_mut()?;
-        infos.clear();
-        if looks.show.needs_infos() {
-            terrain.inspect(infos);
-        }
-        let picture = Picture {
-            view,
-            patches: &terrain.patches(),
-            parts,
-            time_ms,
-            show: looks.show,
-            infos,
-            overlay: &looks.overlay,
-            backdrop: looks.backdrop,
-        };
-        Some(renderer.draw(&picture, team))
+        let draw = |picture: &Picture<'_>| renderer.draw(picture, team);
+        Some(lend(terrain, (view, time_ms), (parts, looks, infos), draw))
     }
+}
+
+/// Lends what a picture of a view of a terrain is made from.
+fn lend<R>(
+    terrain: &Terrain,
+    (view, time_ms): (&ViewDraws, u32),
+    (parts, looks, infos): (&FrameParts, &Looks, &mut Vec<PatchInfo>),
+    draw: impl FnOnce(&Picture<'_>) -> R,
+) -> R {
+    infos.clear();
+    if looks.show.needs_infos() {
+        terrain.inspect(infos);
+    }
+    draw(&Picture {
+        view,
+        patches: &terrain.patches(),
+        parts,
+        time_ms,
+        show: looks.show,
+        infos,
+        overlay: &looks.overlay,
+        backdrop: looks.backdrop,
+    })
 }
 
 /// A scene with everything that it needs to run.
@@ -332,6 +342,21 @@ impl Overfly {
         let Some(view) = output.views.get(view) else { return Ok(None) };
         let House { terrain, drawing } = &mut self.house;
         drawing.get_mut().draw(terrain, (view, output.time_ms), &Team::alone()).transpose()
+    }
+
+    /// Lends what a picture of a view of the last frame is made from, for a renderer that the host
+    /// keeps, as `render_vk::HostRenderer`; `None` without such a view. Such a renderer is told of
+    /// every frame's `built` and `tiles`, and of `terrain().tiles()` when it is made.
+    pub fn with_picture<R>(
+        &mut self,
+        output: &FrameOutput,
+        view: usize,
+        draw: impl FnOnce(&Picture<'_>) -> R,
+    ) -> Option<R> {
+        let view = output.views.get(view)?;
+        let House { terrain, drawing } = &mut self.house;
+        let Drawing { parts, looks, infos, .. } = drawing.get_mut();
+        Some(lend(terrain, (view, output.time_ms), (parts, looks, infos), draw))
     }
 
     /// What pictures show from now on; change it between frames.
