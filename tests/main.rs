@@ -17,6 +17,7 @@ mod contracts {
     mod flights;
     mod grounds;
     mod hills;
+    mod hosting;
     mod importing;
     mod measuring;
     mod pictures;
