@@ -15,6 +15,7 @@ pub use overfly_jobs as jobs;
 pub use overfly_render_vk as render_vk;
 pub use overfly_replay as replay;
 
+pub mod columns;
 pub mod error;
 pub mod host;
 pub mod loader;
@@ -25,6 +26,7 @@ mod resident;
 pub mod sources;
 pub mod surveyor;
 
+pub use columns::{ColumnsFault, DrawColumns, VertexColumns};
 pub use error::{ChangeError, FlightError, FrameError, OpenError};
 pub use host::{Host, HostThreads, Pages, Workers};
 pub use record::RecordError;

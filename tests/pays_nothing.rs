@@ -1,4 +1,4 @@
-//! A frame allocates nothing in the steady state.
+//! A frame and its columns allocate nothing in the steady state.
 //!
 //! In:    the `small` and `earth` scenes, a counting allocator.
 //! Out:   passes or fails.
@@ -6,7 +6,7 @@
 //! Not here: the same for bare graphs (`jobs/tests`).
 
 use overfly::core::frame::{FrameInput, FrameOutput};
-use overfly::{Overfly, config, replay};
+use overfly::{DrawColumns, Overfly, VertexColumns, config, replay};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -42,6 +42,7 @@ fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
     let mut loader = overfly.loader(1).unwrap();
     let flight = overfly.flight("rainier").unwrap();
     let (mut input, mut output) = (FrameInput::default(), FrameOutput::default());
+    let (mut draws, mut vertices) = (DrawColumns::default(), VertexColumns::default());
     let (mut with_pages, mut splits, mut allocations) = (0, 0, 0);
     for (index, pose) in flight.poses[..warm_up + frames].iter().enumerate() {
         input.views.clear();
@@ -49,6 +50,10 @@ fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
         loader.fetch(&output.wanted, &mut input.arrived);
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         overfly.frame(&mut input, &mut output).unwrap();
+        overfly.columns(&output, 0, &mut draws).unwrap();
+        // While it warms up, as a renderer that comes late.
+        let slots = if index < warm_up { &draws.slot } else { &output.built };
+        overfly.vertices(slots, &mut vertices).unwrap();
         if index >= warm_up {
             allocations += ALLOCATIONS.load(Ordering::Relaxed) - before;
             with_pages += u32::from(output.counts.admitted > 0);
@@ -59,7 +64,7 @@ fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
 }
 
 #[test]
-fn a_frame_allocates_nothing_in_the_steady_state() {
+fn a_frame_and_its_columns_allocate_nothing_in_the_steady_state() {
     for workers in [0, 1] {
         let (with_pages, splits, allocations) = fly(workers, 600, 900);
         println!("{workers} workers: {with_pages} frames with pages, {splits} splits");

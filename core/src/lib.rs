@@ -23,6 +23,8 @@ pub mod lattice;
 
 pub mod camera;
 
+pub mod projection;
+
 pub mod scene;
 
 pub mod sun;

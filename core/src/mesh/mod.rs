@@ -12,6 +12,7 @@ mod lists;
 pub mod morph;
 pub mod patches;
 pub mod place;
+pub mod shade;
 pub mod topology;
 pub mod unrest;
 

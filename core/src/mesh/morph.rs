@@ -332,8 +332,9 @@ fn level_of(x: f64) -> u8 {
     level
 }
 
-/// The inverse of [`encode`].
-fn decode(oct: [i16; 2]) -> DVec3 {
+/// The unit normal that two numbers of a vertex encode: the inverse of [`encode`], which is within
+/// 4e-5 rad of what it was given.
+pub fn decode(oct: [i16; 2]) -> DVec3 {
     let [x, y] = oct.map(|c| f64::from(c) / 32767.0);
     let z = 1.0 - x.abs() - y.abs();
     let sign = |c: f64| if c < 0.0 { -1.0 } else { 1.0 };
