@@ -127,6 +127,7 @@ fn unsafe_stands_only_where_it_may() {
         "core/tests/ground_allocation.rs",
         "render_vk/tests/drawing_allocation.rs",
         "tests/pays_nothing.rs",
+        "tests/ground_queries.rs",
         "tests/architecture.rs",
     ];
     for (file, text) in sources() {

@@ -9,10 +9,12 @@ mod architecture;
 mod contracts {
     mod archives;
     mod budgets;
+    mod columns;
     mod command_line;
     mod cracks;
     mod depths;
     mod embedding;
+    mod examples;
     mod extremes;
     mod flights;
     mod grounds;
@@ -20,6 +22,7 @@ mod contracts {
     mod hosting;
     mod importing;
     mod measuring;
+    mod parked;
     mod pictures;
     mod probing;
     mod rainier_agl;
