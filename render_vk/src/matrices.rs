@@ -9,6 +9,7 @@ use crate::picture::{Picture, Show};
 use glam::DVec3;
 use overfly_core::frame::data::ViewDraws;
 use overfly_core::geodesy::narrow;
+use overfly_core::projection::DepthTerms;
 use overfly_core::settings::DepthOrder;
 
 /// The shaders' `View`: what is the same in all depth ranges of a picture.
@@ -104,23 +105,11 @@ pub(crate) struct RangeTerms {
 const _: () = assert!(size_of::<RangeTerms>() == 16);
 
 impl RangeTerms {
-    /// The terms of range `index`, from `near_m` to `far_m`, which may be infinite.
-    pub(crate) fn new(order: DepthOrder, [near_m, far_m]: [f64; 2], index: usize) -> Self {
-        // Reversed: 1 at the near border and 0 at the far one.
-        let (slope, offset) = if far_m.is_finite() {
-            (-near_m / (far_m - near_m), near_m * (far_m / (far_m - near_m)))
-        } else {
-            (0.0, near_m)
-        };
+    /// The terms of range `index` between two borders, the far one of which may be infinite.
+    pub(crate) fn new(order: DepthOrder, borders_m: [f64; 2], index: usize) -> Self {
+        let DepthTerms { slope, offset, far } = DepthTerms::of(order, borders_m);
         let index = u32::try_from(index).expect("ranges are few");
-        match order {
-            DepthOrder::Reversed => {
-                Self { slope: narrow(slope), offset: narrow(offset), far: 0.0, index }
-            }
-            DepthOrder::Forward => {
-                Self { slope: narrow(1.0 - slope), offset: narrow(-offset), far: 1.0, index }
-            }
-        }
+        Self { slope, offset, far, index }
     }
 }
 
