@@ -337,5 +337,8 @@ fn instructions_are_counted_frame_by_frame_where_there_is_valgrind() {
     let run = json(&run);
     let column = run["instructions"]["columns"]["instructions"].as_array().unwrap();
     assert_eq!(column.len(), 2, "no more frames are counted than there are");
-    assert!(column.iter().all(|count| (1e4..1e10).contains(&count.as_f64().unwrap())), "{column:?}");
+    assert!(
+        column.iter().all(|count| (1e4..1e10).contains(&count.as_f64().unwrap())),
+        "{column:?}"
+    );
 }

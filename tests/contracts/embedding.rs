@@ -65,6 +65,14 @@ fn frames_are_the_same_bits_whoever_helps() {
     assert_eq!(flown(host(Workers::Host(late)), 40), alone, "tasks that are never run");
 }
 
+/// What a thread of a host does while it has nothing else to do.
+fn lend(crew: Arc<overfly::jobs::Workers>, stops: &AtomicBool, helped: &AtomicU64) {
+    while !stops.load(Ordering::Relaxed) {
+        helped.fetch_add(u64::from(crew.join_as_worker()), Ordering::Relaxed);
+        std::thread::yield_now();
+    }
+}
+
 #[test]
 fn threads_of_the_host_work_when_they_have_time_and_leave_when_they_like() {
     let alone = flown(host(Workers::Caller), 40);
@@ -76,13 +84,7 @@ fn threads_of_the_host_work_when_they_have_time_and_leave_when_they_like() {
         for _ in 0..3 {
             let crew = overfly.crew();
             let (stops, helped) = (&stops, &helped);
-            scope.spawn(move || {
-                while !stops.load(Ordering::Relaxed) {
-                    let joined = crew.join_as_worker();
-                    helped.fetch_add(u64::from(joined), Ordering::Relaxed);
-                    std::thread::yield_now();
-                }
-            });
+            scope.spawn(move || lend(crew, stops, helped));
         }
         // Frames go on until somebody has helped, so that the test cannot pass without it.
         let mut digests = fly(&mut overfly, 40, |_, _| {});
