@@ -18,6 +18,7 @@ const FOLDERS: [&str; 13] = [
     "archive",
     "ingest",
     "tracks",
+    "python",
     "xtask",
     "tests",
     "benches",
@@ -57,6 +58,7 @@ fn crates_name_only_the_crates_below_them() {
         ("archive", vec!["overfly-core", "overfly-jobs"]),
         ("ingest", vec!["overfly-core", "overfly-archive"]),
         ("tracks", vec!["overfly-core", "overfly-replay"]),
+        ("python", vec![]),
         ("xtask", vec![]),
     ];
     for (folder, below) in allowed {
