@@ -1,4 +1,4 @@
-//! Set-up, checks and results: `cargo xtask demo`, `cargo xtask test`, `cargo xtask trade`.
+//! Set-up, checks and results: `cargo xtask demo`, `test`, `trade`, `python`.
 //!
 //! In:    one word on the command line.
 //! Out:   what is done, why, how long it took, and an exit code.
@@ -6,6 +6,7 @@
 //! Not here: the terrain; the steps run the built `overfly` and cargo.
 #![forbid(unsafe_code)]
 
+mod python;
 mod set_up;
 mod steps;
 mod trade;
@@ -22,6 +23,7 @@ commands:
   demo   sets up drawing, builds overfly and flies two flights; pictures go to out/demo
   test   sets up drawing with Vulkan's validation layers and runs every test
   trade  measures what settings cost over the three flights, into docs/trade.md
+  python installs the Python module into target/python and runs its checks
   help   prints this
 
 On Debian and Ubuntu, missing packages are installed with apt-get (through sudo if need be).
@@ -34,12 +36,15 @@ fn main() -> ExitCode {
         ["demo"] => demo(&root()),
         ["test"] => test(&root()),
         ["trade"] => trade::trade(&root(), &cargo(), &overfly(&root()).display().to_string()),
+        ["python"] => python::python(&root(), &cargo()),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             Ok(())
         }
         [] => return refuse("a command is missing"),
-        ["demo" | "test" | "trade" | "help", ..] => return refuse("a command takes no arguments"),
+        ["demo" | "test" | "trade" | "python" | "help", ..] => {
+            return refuse("a command takes no arguments");
+        }
         [word, ..] => return refuse(&format!("there is no command {word}")),
     };
     match done {
