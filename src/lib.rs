@@ -255,8 +255,8 @@ impl Overfly {
         self.house.drawing.get_mut().report.take().transpose().map_err(FrameError::Draw)
     }
 
-    /// Goes over to another scene. Where more than the sun is another the terrain begins anew, and
-    /// pages that arrive with the change are not taken.
+    /// Goes over to another scene. Where more than the sun is another the terrain begins anew, tickets
+    /// are void, and pages that arrive with the change are not taken.
     fn change(
         &mut self,
         scene: &SceneSettings,
@@ -277,22 +277,21 @@ impl Overfly {
         if let Some((setting, _)) = fixed.iter().find(|(_, same)| !same) {
             return Err(ChangeError::Fixed { setting });
         }
+        let is_other_ground = now.sources != scene.sources || now.sea != scene.sea;
+        let sources = is_other_ground.then(|| Sources::open(scene, &self.patience));
+        let sources = sources.transpose().map_err(ChangeError::Source)?.map(Arc::new);
+        if let Some(sources) = &sources {
+            self.loading.follow(sources).map_err(ChangeError::Loader)?;
+        }
         if let Some(recorder) = &mut self.recorder {
             recorder.note_scene(scene).map_err(ChangeError::Record)?;
         }
-        let is_ground = now.sources == scene.sources && now.sea == scene.sea;
-        if now.sources != scene.sources {
-            let sources = Sources::open(scene, &self.patience).map_err(ChangeError::Source)?;
-            let sources = Arc::new(sources);
-            self.loading.follow(&sources).map_err(ChangeError::Loader)?;
+        if let Some(sources) = sources {
             self.requests = Requests::new(sources.clone(), self.house.terrain.limits().pages);
             self.sources.close();
             self.sources = sources;
-        }
-        if !is_ground {
             self.house.terrain = Terrain::new(scene, self.sources.generator());
             self.ground = ResidentGround::new(scene.body, scene.sea);
-            self.loading.forget();
             arrived.clear();
             if let Some(renderer) = &mut self.house.drawing.get_mut().renderer {
                 renderer.note_tiles(&self.house.terrain.tiles());

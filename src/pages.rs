@@ -51,14 +51,6 @@ impl Loading {
         }
     }
 
-    /// Nothing is wanted any more.
-    pub fn forget(&mut self) {
-        self.wanted.clear();
-        if let Some(loader) = &mut self.loader {
-            loader.request(&[], 0);
-        }
-    }
-
     /// Pages come from elsewhere from now on.
     pub fn follow(&mut self, sources: &Arc<Sources>) -> io::Result<()> {
         *self = Self::new(self.pages, sources)?;

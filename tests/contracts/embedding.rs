@@ -171,6 +171,7 @@ fn edits_of_the_scene_are_part_of_a_recording_and_replay() {
             input.scene = edits(&scene, index).map(Box::new);
         });
         assert_eq!(overfly.scene(), &scene, "frame 30 goes back to it");
+        assert_eq!(overfly.sources().sea(), scene.sea, "so do those who wait for pages");
         if path.is_some() {
             assert_eq!(overfly.finish_recording().unwrap(), 45);
         }
