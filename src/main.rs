@@ -47,6 +47,8 @@ enum Command {
     Ingest(cli::ingest::Arguments),
     /// Makes a flight of a recording in another format: IGC, GPX, KML, X-Plane, Tacview, NMEA, ADS-B.
     Import(cli::import::Arguments),
+    /// Answers other simulators over UDP: CIGI 3.3, FlightGear's native FDM.
+    Serve(cli::serve::Arguments),
     /// Shows what this machine has and lacks: Vulkan devices, layers, cores.
     Doctor,
 }
@@ -72,6 +74,7 @@ fn main() -> ExitCode {
         Command::Probe(arguments) => cli::probe::run(&arguments),
         Command::Ingest(arguments) => cli::ingest::run(&arguments),
         Command::Import(arguments) => cli::import::run(&arguments),
+        Command::Serve(arguments) => cli::serve::run(&arguments),
         Command::Doctor => Ok(cli::doctor::run()),
     };
     outcome.unwrap_or_else(|error| {

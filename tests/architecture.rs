@@ -8,7 +8,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const FOLDERS: [&str; 13] = [
+const FOLDERS: [&str; 14] = [
     "src",
     "core",
     "jobs",
@@ -18,6 +18,7 @@ const FOLDERS: [&str; 13] = [
     "archive",
     "ingest",
     "tracks",
+    "link",
     "python",
     "xtask",
     "tests",
@@ -58,6 +59,7 @@ fn crates_name_only_the_crates_below_them() {
         ("archive", vec!["overfly-core", "overfly-jobs"]),
         ("ingest", vec!["overfly-core", "overfly-archive"]),
         ("tracks", vec!["overfly-core", "overfly-replay"]),
+        ("link", vec!["overfly-core", "overfly-config"]),
         ("python", vec![]),
         ("xtask", vec![]),
     ];

@@ -30,6 +30,7 @@ mod contracts {
     #[allow(dead_code, reason = "the archive's own tests let it misbehave in more ways")]
     #[path = "../../archive/tests/contracts/server.rs"]
     mod server;
+    mod serving;
     mod trading;
     mod validation;
     mod window;

@@ -28,6 +28,7 @@ pub mod probe;
 pub mod replay;
 pub mod report;
 pub mod run;
+pub mod serve;
 pub mod source;
 pub mod still;
 pub mod stills;
