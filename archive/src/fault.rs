@@ -44,6 +44,8 @@ pub enum ArchiveFault {
     Metadata(String),
     /// Bytes are missing or make no sense.
     Corrupt(String),
+    /// The host, which reads itself, failed.
+    Host(String),
     /// The server gave no usable answer, retries included.
     Server(String),
     /// The archive is not the one that was opened.
@@ -87,6 +89,7 @@ impl fmt::Display for ArchiveFault {
             }
             Self::Metadata(what) => write!(f, "its metadata is unusable: {what}"),
             Self::Corrupt(what) => write!(f, "it is damaged: {what}"),
+            Self::Host(what) => write!(f, "the host cannot read it: {what}"),
             Self::Server(what) => write!(f, "the server fails: {what}"),
             Self::Changed(what) => write!(f, "it has changed since it was opened: {what}"),
             Self::Resting(last) => {

@@ -12,6 +12,7 @@ mod directories;
 mod fault;
 mod header;
 pub mod metadata;
+mod reader;
 mod server;
 mod source;
 mod unpack;
@@ -19,6 +20,7 @@ mod unpack;
 pub use fault::{ArchiveError, ArchiveFault};
 pub use metadata::Facts;
 pub use overfly_core::datasource::facts::{ArchiveFacts, Datum, ImageryFacts, LayerFacts};
+pub use reader::Reader;
 
 use directories::Directories;
 use header::{Sections, tile_name};
@@ -27,6 +29,7 @@ use overfly_core::settings::is_address;
 use overfly_jobs::now_ns;
 use parking_lot::Mutex;
 use pmtiles::{AsyncPmTilesReader, Compression, PmtError, TileCoord};
+use reader::HostFile;
 use server::Server;
 use source::{Place, Source, TILE_BYTES_MAX, at_once};
 use std::fmt;
@@ -59,7 +62,7 @@ impl fmt::Display for Location {
     }
 }
 
-/// How patient to be with a server. Files need none of it.
+/// Who reads, and how patient to be with a server. Files need none of it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct OpenOptions {
     /// Longest wait for a name, and for a connection.
@@ -75,6 +78,8 @@ pub struct OpenOptions {
     pub failures_max: u32,
     /// For how long it is left alone.
     pub cool_down: Duration,
+    /// Reads all archives, whatever their locations look like; `None`: we do.
+    pub reader: Option<Reader>,
 }
 
 impl Default for OpenOptions {
@@ -87,6 +92,7 @@ impl Default for OpenOptions {
             backoff: Duration::from_millis(200),
             failures_max: 1,
             cool_down: Duration::from_secs(10),
+            reader: None,
         }
     }
 }
@@ -190,11 +196,12 @@ impl<F> Archive<F> {
         options: &OpenOptions,
         kind: impl Fn(Facts) -> Result<F, ArchiveFault>,
     ) -> Result<Self, ArchiveError> {
-        let opened = match location {
-            Location::File(path) => Place::file(path),
-            Location::Http(url) => Ok(Place::Server(Box::new(Server::new(url, options)))),
-        };
         let name = location.to_string();
+        let opened = match (&options.reader, location) {
+            (Some(reader), _) => Ok(Place::Host(HostFile::new(&name, reader))),
+            (None, Location::File(path)) => Place::file(path),
+            (None, Location::Http(url)) => Ok(Place::Server(Box::new(Server::new(url, options)))),
+        };
         opened
             .and_then(|place| Self::read(name.clone(), Arc::new(place), kind))
             .map_err(|fault| ArchiveError { archive: name, fault })
@@ -272,7 +279,7 @@ impl<F> Archive<F> {
     /// How it has fared so far. Cheap; never blocks on the server.
     pub fn health(&self) -> Health {
         let resting = match self.place.as_ref() {
-            Place::File(_) => false,
+            Place::File(_) | Place::Host(_) => false,
             Place::Server(server) => server.breaker.is_resting(now_ns()),
         };
         Health { resting, ..self.health.lock().clone() }
@@ -281,8 +288,10 @@ impl<F> Archive<F> {
     /// Gives up: whoever waits to retry fails within 20 ms, a request under way when it ends or
     /// times out, and later ones at once. For a host that wants to end while a server is silent.
     pub fn close(&self) {
-        if let Place::Server(server) = self.place.as_ref() {
-            server.breaker.close();
+        match self.place.as_ref() {
+            Place::File(_) => {}
+            Place::Host(host) => host.close(),
+            Place::Server(server) => server.breaker.close(),
         }
     }
 }

@@ -7,6 +7,7 @@
 
 use crate::fault::ArchiveFault;
 use crate::header::{OPENING_BYTES, Sections, sections};
+use crate::reader::HostFile;
 use crate::server::Server;
 use crate::unpack;
 use bytes::Bytes;
@@ -30,6 +31,8 @@ pub(crate) const TILE_BYTES_MAX: usize = 1 << 20;
 pub(crate) enum Place {
     /// A file, mapped into memory.
     File(MappedFile),
+    /// Wherever the host has it.
+    Host(HostFile),
     /// A server.
     Server(Box<Server>),
 }
@@ -62,6 +65,7 @@ impl Place {
     pub(crate) fn size(&self) -> Option<u64> {
         match self {
             Self::File(mapped) => Some(mapped.state.0),
+            Self::Host(_) => None,
             Self::Server(server) => server.size(),
         }
     }
@@ -70,6 +74,7 @@ impl Place {
     pub(crate) fn read(&self, offset: u64, length: usize) -> Result<Bytes, ArchiveFault> {
         match self {
             Self::File(mapped) => mapped.read(offset, length),
+            Self::Host(host) => host.read(offset, length),
             Self::Server(server) => server.read(offset, length),
         }
     }

@@ -6,6 +6,7 @@
 //! Not here: the terrain; the steps run the built `overfly` and cargo.
 #![forbid(unsafe_code)]
 
+mod capi;
 mod python;
 mod set_up;
 mod steps;
@@ -23,6 +24,8 @@ commands:
   demo   sets up drawing, builds overfly and flies two flights; pictures go to out/demo
   test   sets up drawing with Vulkan's validation layers and runs every test
   trade  measures what settings cost over the three flights, into docs/trade.md
+  capi --prefix DIR [--dev]
+         builds the library for C and installs it below DIR, with header and pkg-config file
   python installs the Python module into target/python and runs its checks
   help   prints this
 
@@ -36,6 +39,10 @@ fn main() -> ExitCode {
         ["demo"] => demo(&root()),
         ["test"] => test(&root()),
         ["trade"] => trade::trade(&root(), &cargo(), &overfly(&root()).display().to_string()),
+        ["capi", ref words @ ..] => match capi::Install::parse(words) {
+            Ok(install) => install.install(&root(), &cargo()),
+            Err(why) => return refuse(&why),
+        },
         ["python"] => python::python(&root(), &cargo()),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");

@@ -5,6 +5,7 @@
 //! Keeps: nothing.
 //! Not here: what tiles mean (`overfly_core`).
 
+mod hosted;
 mod hostile;
 mod local;
 mod remote;

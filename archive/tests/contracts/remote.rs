@@ -20,6 +20,7 @@ fn patient() -> OpenOptions {
         backoff: Duration::from_millis(5),
         failures_max: 1,
         cool_down: Duration::from_secs(3600),
+        reader: None,
     }
 }
 
