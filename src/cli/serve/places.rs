@@ -1,8 +1,7 @@
 //! Places that hosts ask about: their pages are fetched, and stay while somebody asks.
 //!
 //! In:    questions as they are asked.
-//! Out:   requests to the terrain, so that the same question has an answer some frames later, and
-//!        the next one of somebody who moves at once.
+//! Out:   requests to the terrain, so that the same question has an answer some frames later.
 //! Keeps: tickets of at most [`TICKETS_MAX`] pages of the level that answers are of.
 //! Not here: what is answered (`overfly_link`), how pages are fetched (`overfly::Overfly`).
 
@@ -22,11 +21,7 @@ const NEW_MAX: usize = 8;
 /// Different pages that one frame's questions may name.
 const NAMED_MAX: usize = 1024;
 /// How long a page stays after the last question about it.
-const STAY_NS: u64 = 10_000_000_000;
-/// Whoever asks about a page beside one that was asked about so lately moves.
-const MOVES_NS: u64 = 1_000_000_000;
-/// How far around somebody who moves pages are fetched, in sides of a page.
-const AHEAD: f64 = 1.5;
+const STAY_NS: u64 = 3_000_000_000;
 
 struct Held {
     ticket: Ticket,
@@ -90,8 +85,7 @@ impl Places {
                 continue;
             }
             new += 1;
-            let radius_m = if self.moves(key, now_ns) { AHEAD * self.side_m(key) } else { 0.0 };
-            match overfly.request(Region { centre, radius_m }, self.level) {
+            match overfly.request(Region { centre, radius_m: 0.0 }, self.level) {
                 Ok(ticket) => drop(self.held.insert(key, Held { ticket, asked_ns: now_ns })),
                 Err(_) => self.refused += 1,
             }
@@ -100,20 +94,5 @@ impl Places {
         for (_, held) in self.held.extract_if(.., |_, held| old(held)) {
             overfly.release(held.ticket);
         }
-    }
-
-    /// Whether a page lies beside one that was asked about a moment ago.
-    fn moves(&self, key: PageKey, now_ns: u64) -> bool {
-        let beside = |other: PageKey| {
-            let apart = other.x().abs_diff(key.x()).max(other.y().abs_diff(key.y()));
-            other.quadrant() == key.quadrant() && apart <= 1
-        };
-        let mut held = self.held.iter();
-        held.any(|(&other, held)| beside(other) && now_ns - held.asked_ns < MOVES_NS)
-    }
-
-    /// About the side of a page in metres.
-    fn side_m(&self, key: PageKey) -> f64 {
-        core::f64::consts::FRAC_PI_2 * self.body.a_m / f64::from(1_u32 << key.depth())
     }
 }

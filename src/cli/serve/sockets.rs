@@ -83,30 +83,43 @@ impl Sockets {
     /// Hands over every datagram that came. Where `take` says that one was a message, its sender
     /// is answered from now on.
     pub fn receive(&mut self, mut take: impl FnMut(Link, &[u8]) -> bool) {
-        let links = [(Link::Cigi, &self.cigi), (Link::NativeFdm, &self.native_fdm)];
-        for (link, socket) in links {
-            let Some(socket) = socket else { continue };
-            let (mut datagrams, mut bytes) = (0, 0);
-            while datagrams < DATAGRAMS_MAX && bytes < BYTES_MAX {
-                datagrams += 1;
-                let (length, from) = match socket.recv_from(&mut self.buffer) {
-                    Ok(received) => received,
-                    Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-                    Err(_) => {
-                        self.lost.unread += 1;
-                        continue;
-                    }
-                };
-                bytes += length;
-                let wanted = self.reply_to.filter(|_| link == Link::Cigi);
-                if wanted.is_some_and(|host| host.ip() != from.ip()) {
-                    self.lost.strangers += 1;
-                } else if take(link, &self.buffer[..length]) && link == Link::Cigi {
-                    self.last = Some(from);
-                }
+        self.drain(Link::Cigi, &mut take);
+        self.drain(Link::NativeFdm, &mut take);
+    }
+
+    fn drain(&mut self, link: Link, take: &mut impl FnMut(Link, &[u8]) -> bool) {
+        let (mut datagrams, mut bytes) = (0, 0);
+        while datagrams < DATAGRAMS_MAX && bytes < BYTES_MAX {
+            let Some(received) = self.next(link) else { return };
+            datagrams += 1;
+            let Some((length, from)) = received else { continue };
+            bytes += length;
+            if take(link, &self.buffer[..length]) && link == Link::Cigi {
+                self.last = Some(from);
             }
         }
+    }
+
+    /// The next datagram of a link: none is there, or it is lost, or its length and sender.
+    fn next(&mut self, link: Link) -> Option<Option<(usize, SocketAddr)>> {
+        let socket = match link {
+            Link::Cigi => self.cigi.as_ref()?,
+            Link::NativeFdm => self.native_fdm.as_ref()?,
+        };
+        let (length, from) = match socket.recv_from(&mut self.buffer) {
+            Ok(received) => received,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return None,
+            Err(error) => {
+                self.lost.unread += u64::from(error.kind() != ErrorKind::Interrupted);
+                return Some(None);
+            }
+        };
+        let wanted = self.reply_to.filter(|_| link == Link::Cigi);
+        if wanted.is_some_and(|host| host.ip() != from.ip()) {
+            self.lost.strangers += 1;
+            return Some(None);
+        }
+        Some(Some((length, from)))
     }
 
     /// Sends a message to the host, if there is one. A host that is not there is no fault.
