@@ -38,7 +38,6 @@ pub use requests::{RequestError, Ticket};
 struct Readme;
 
 use crate::archive::OpenOptions;
-use crate::core::camera::View;
 use crate::core::datasource::{Page, PageKey};
 use crate::core::frame::data::ViewDraws;
 use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
@@ -229,7 +228,7 @@ impl Overfly {
         output: &mut FrameOutput,
         view: Option<usize>,
     ) -> Result<Option<DrawReport>, FrameError> {
-        input.views.iter().try_for_each(View::check).map_err(FrameError::View)?;
+        self.house.terrain.check(input).map_err(FrameError::View)?;
         if let Some(scene) = input.scene.take() {
             self.change(&scene, &mut input.arrived).map_err(FrameError::Scene)?;
         }
@@ -287,7 +286,7 @@ impl Overfly {
             recorder.note_scene(scene).map_err(ChangeError::Record)?;
         }
         if let Some(sources) = sources {
-            self.requests = Requests::new(sources.clone(), self.house.terrain.limits().pages);
+            self.requests.begin_anew(sources.clone());
             self.sources.close();
             self.sources = sources;
             self.house.terrain = Terrain::new(scene, self.sources.generator());

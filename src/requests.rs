@@ -99,6 +99,11 @@ impl Requests {
         }
     }
 
+    /// None any more, of other sources; old tickets hold nothing, and are never given out again.
+    pub fn begin_anew(&mut self, sources: Arc<Sources>) {
+        *self = Self { next: self.next, ..Self::new(sources, self.pages_max) };
+    }
+
     /// Pages that all requests together may hold.
     pub fn pages_max(&self) -> u32 {
         self.pages_max

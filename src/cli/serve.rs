@@ -83,7 +83,8 @@ pub struct Arguments {
     altitude: Altitude,
     /// Lattice level whose heights are the answers, 0 to 56. [default: that of the scene's finest
     /// data; without data, samples 1 m apart]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(..=i64::from(LEVEL_MAX)))]
+    #[arg(long, value_name = "N",
+          value_parser = clap::value_parser!(u8).range(..=i64::from(LEVEL_MAX)))]
     level: Option<u8>,
     /// Most bytes of a message to the host, 256 to 65507; what does not fit waits a frame.
     #[arg(long, value_name = "BYTES", value_parser = parse_message, default_value = "8192")]

@@ -214,6 +214,10 @@ fn an_edit_that_cannot_be_is_refused_and_changes_nothing() {
     assert!(refused(SceneSettings { lod, ..scene.clone() }).contains("lod cannot change"));
     let sources = vec![SourceSettings::Archive { location: "nowhere.pmtiles".into() }];
     assert!(refused(SceneSettings { sources, ..scene.clone() }).contains("nowhere.pmtiles"));
+    let mut input = FrameInput { time_s: f64::NAN, ..FrameInput::default() };
+    input.scene = edits(&scene, 10).map(Box::new);
+    let refused = overfly.frame(&mut input, &mut FrameOutput::default()).unwrap_err().to_string();
+    assert!(refused.contains("time is NaN s"), "{refused}");
     assert_eq!(overfly.scene(), &scene);
     let late = overfly.record("late.ovf".as_ref(), "late", 60.0).unwrap_err().to_string();
     assert!(late.contains("3 frames were run"), "{late}");

@@ -186,6 +186,16 @@ impl Terrain {
     /// A view, a time or a page that cannot be used, or a thread whose arithmetic is not IEEE
     /// 754's: nothing was taken and the terrain is as it was.
     pub fn begin(&self, input: &mut FrameInput) -> Result<(), ViewFault> {
+        self.check(input)?;
+        core::mem::swap(&mut *self.input.lock(), input);
+        Ok(())
+    }
+
+    /// What [`Self::begin`] checks before it takes anything.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn check(&self, input: &FrameInput) -> Result<(), ViewFault> {
         let broken = |fault: ArithmeticFault| ViewFault::Arithmetic { sentence: fault.sentence() };
         check_arithmetic().map_err(broken)?;
         input.views.iter().try_for_each(crate::camera::View::check)?;
@@ -193,9 +203,7 @@ impl Terrain {
             return Err(ViewFault::Time { found_s: input.time_s });
         }
         let deepest_m = -narrow(DEEPEST * self.horizon.curvature_m[0]);
-        input.arrived.iter().try_for_each(|page| check_page(page, deepest_m))?;
-        core::mem::swap(&mut *self.input.lock(), input);
-        Ok(())
+        input.arrived.iter().try_for_each(|page| check_page(page, deepest_m))
     }
 
     /// Hands over the frame's output, and takes the old one's memory for the next.

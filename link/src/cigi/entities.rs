@@ -2,7 +2,7 @@
 //!
 //! In:    Entity Control and Conformal Clamped Entity Control.
 //! Out:   poses.
-//! Keeps: at most [`ENTITIES_MAX`] entities; no chain of them is longer than [`CHAIN_MAX`].
+//! Keeps: at most [`ENTITIES_MAX`] entities; those beyond [`CHAIN_MAX`] in a chain have no pose.
 //! Not here: views (`views`), requests (`requests`).
 
 use super::packet::{Attitude, Clamp, ClampedEntity, EntityControl, EntityState, MslPlace, Placed};
@@ -91,8 +91,11 @@ impl Entities {
         }
         let mut gone = vec![id];
         while let Some(parent) = gone.pop() {
-            let hangs = |entity: &Entity| matches!(entity.placed, Placed::Child { parent: on, .. } if on == parent);
-            let lost = self.by_id.extract_if(.., |_, entity| hangs(entity));
+            let hangs = |placed: Placed| match placed {
+                Placed::Top(_) => false,
+                Placed::Child { parent: on, .. } => on == parent,
+            };
+            let lost = self.by_id.extract_if(.., |_, entity| hangs(entity.placed));
             gone.extend(lost.map(|(id, _)| id));
         }
     }
