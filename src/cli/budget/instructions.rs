@@ -37,7 +37,9 @@ pub fn count(
     let mut command = Command::new("valgrind");
     command.args(["--tool=callgrind", "--combine-dumps=yes", "--collect-atstart=no"]);
     command.arg(format!("--callgrind-out-file={}", out.display()));
-    command.arg(format!("--toggle-collect=*{COUNTED}*")).arg(format!("--dump-after=*{COUNTED}*"));
+    // Callgrind takes one option a pattern.
+    command.arg(format!("--toggle-collect=*{COUNTED}*"));
+    command.arg(format!("--dump-after=*flown*{COUNTED}*"));
     command.arg(std::env::current_exe()?).args(["budget", &plan.flight]);
     command.args(["--counters-only", "--errors", "0", "--runs", "1", "--workers", "0"]);
     command.args(["--frames", &format!("{first}..{}", first + count)]);
