@@ -169,7 +169,7 @@ impl Versus {
         }
     }
 
-    /// The verdict in a sentence, about the whole frame.
+    /// The verdict in a sentence, about the whole frame; what of it is slower comes first.
     pub fn sentence(&self) -> String {
         let Some(frame) = self.compared.first() else { return "no pair was finished".into() };
         let (pairs, effect) = (self.pairs, self.rule.effect * 100.0);
@@ -181,11 +181,17 @@ impl Versus {
                  ±{effect} % takes about {needed:.0}"
             );
         }
-        let word = frame.relation.word();
-        format!(
-            "{word}: {} is {} in the typical frame, {pairs} pairs",
-            self.labels[1], frame.typical
-        )
+        let slower = self.compared[1..].iter().filter(|one| one.relation == Relation::Slower);
+        let slower: Vec<String> =
+            slower.map(|one| format!("{} by {}", one.name, one.typical)).collect();
+        let (word, label) = (frame.relation.word(), &self.labels[1]);
+        let of_frame = format!("{label} is {} in the typical frame, {pairs} pairs", frame.typical);
+        match (slower.is_empty(), frame.relation) {
+            (false, relation) if relation != Relation::Slower => {
+                format!("SLOWER: {}; the whole frame: {word}: {of_frame}", slower.join(", "))
+            }
+            _ => format!("{word}: {of_frame}"),
+        }
     }
 
     fn rows(&self) -> impl Iterator<Item = [String; 5]> {
