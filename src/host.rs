@@ -40,7 +40,7 @@ pub enum Workers {
 
 /// Threads of the host, lent for parts of a frame.
 pub enum HostThreads {
-    /// At most so many, 0 to 64, which call `Overfly::crew`'s `work` when they have time.
+    /// At most so many, 0 to 64, which call `join_as_worker` of `Overfly::crew` when they have time.
     Lent {
         /// How many may help at once.
         most: usize,

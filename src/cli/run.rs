@@ -137,7 +137,7 @@ fn frame(
         input.hold_lod = false;
     }
     let scene = input.scene.as_ref().map(|scene| config::write(scene)).transpose()?;
-    let changes = scene.is_some();
+    let sources = overfly.sources().clone();
     let arriving = arriving(run, &output.wanted);
     run.loader.fetch(&arriving, &mut input.arrived);
     if input.arrived.len() < arriving.len() {
@@ -160,7 +160,7 @@ fn frame(
         overfly.frame(input, output)?;
     }
     let end_ns = now_ns();
-    if changes {
+    if !Arc::ptr_eq(&sources, overfly.sources()) {
         run.loader = overfly.loader(super::replay::default_workers().max(1))?;
         run.coming.clear();
     }

@@ -195,6 +195,8 @@ fn edits_of_the_scene_are_part_of_a_recording_and_replay() {
     let played = program(&["replay", name, "--no-render", "--record", again_text]);
     assert!(played.code == 0, "{}", played.err);
     assert_eq!(Recording::open(&again).unwrap().frames, frames);
+    let late = program(&["replay", name, "--no-render", "--frames", "25..28"]);
+    assert_eq!(late.code, 0, "{}", late.err);
     let measured = program(&["measure", name]);
     assert_eq!(measured.code, 2);
     assert!(measured.err.contains("the ground becomes another in frame 10"), "{}", measured.err);
