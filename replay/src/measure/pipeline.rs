@@ -12,7 +12,7 @@
 use super::frame::Measure;
 use super::screen::Screen;
 use super::spread::{Spread, Where};
-use super::thorough::{Shot, spread_of};
+use super::thorough::{Shot, spread_at, spread_of};
 use glam::{DVec2, DVec3};
 use overfly_core::camera::Camera;
 use overfly_core::frame::{FrameOutput, Terrain};
@@ -142,26 +142,37 @@ pub fn in_picture(
     vertices.filter(seen).collect()
 }
 
-fn of_shot(measure: &Measure, shot: &Shot<'_>) -> Vec<Drawn> {
+/// The vertices of a frame that is measured.
+pub(super) fn drawn(measure: &Measure, shot: &Shot<'_>) -> Vec<Drawn> {
     in_picture((shot.terrain, shot.output), &measure.now.drawn, &shot.screen)
 }
 
 /// M32 − M64 in pixels: of the uploaded bytes alone, and of all f32 arithmetic up to the pixel.
-pub(super) fn arithmetic(measure: &Measure, shot: &Shot<'_>) -> [Spread; 2] {
+pub(super) fn arithmetic(measure: &Measure, shot: &Shot<'_>, all: &[Drawn]) -> [Spread; 2] {
     let camera = &shot.output.views[0].camera;
     let pipeline = Pipeline::new(shot.terrain.settings(), camera, shot.output.time_ms);
-    let (mut bytes, mut whole) = (Vec::new(), Vec::new());
-    for drawn in of_shot(measure, shot) {
-        let Some(exact) = shot.screen.pixel(drawn.exact) else { continue };
-        let place = measure.place_of(drawn.exact.normalize(), exact, shot.frame);
-        let stored = pipeline.stored(&drawn.vertex, drawn.morph.as_ref());
-        if let Some(stored) = shot.screen.pixel(stored) {
-            bytes.push(((stored - exact).length(), place));
+    let bytes = |drawn: &Drawn, exact: DVec2| {
+        let stored = shot.screen.pixel(pipeline.stored(&drawn.vertex, drawn.morph.as_ref()))?;
+        Some((stored - exact).length())
+    };
+    let whole = |drawn: &Drawn, exact: DVec2| {
+        let view = pipeline.view(&drawn.vertex, drawn.morph.as_ref());
+        Some((pipeline.pixel(view) - exact).length())
+    };
+    let stray = |of: &dyn Fn(&Drawn, DVec2) -> Option<f64>| {
+        let (mut values, mut seen) = (Vec::with_capacity(all.len()), Vec::new());
+        for drawn in all {
+            let exact = shot.screen.pixel(drawn.exact);
+            let Some(value) = exact.and_then(|exact| of(drawn, exact)) else { continue };
+            values.push(value);
+            seen.push(drawn.exact);
         }
-        let drawn = pipeline.pixel(pipeline.view(&drawn.vertex, drawn.morph.as_ref()));
-        whole.push(((drawn - exact).length(), place));
-    }
-    [spread_of(&bytes), spread_of(&whole)]
+        spread_at(&values, |at| {
+            let pixel = shot.screen.pixel(seen[at]).unwrap_or_default();
+            measure.place_of(seen[at].normalize(), pixel, shot.frame)
+        })
+    };
+    [stray(&bytes), stray(&whole)]
 }
 
 /// Vertices whose jitter is looked at.
@@ -172,12 +183,11 @@ const STEPS: u32 = 64;
 const STEP_PX: f64 = 0.05;
 
 /// J1: how the error of f32 varies while the eye moves slowly, and its greatest step.
-pub(super) fn jitter(measure: &Measure, shot: &Shot<'_>) -> (Spread, f64) {
+pub(super) fn jitter(measure: &Measure, shot: &Shot<'_>, all: &[Drawn]) -> (Spread, f64) {
     let camera = &shot.output.views[0].camera;
     let pipeline = Pipeline::new(shot.terrain.settings(), camera, shot.output.time_ms);
     let mut found = Vec::new();
     let mut step_px = 0.0_f64;
-    let all = of_shot(measure, shot);
     for drawn in all.iter().step_by(all.len().div_ceil(TREMBLING).max(1)) {
         let trembles = tremble(drawn, &|eye| pipeline.moved(eye), &shot.screen);
         let pixel = shot.screen.pixel(drawn.exact).unwrap_or_default();

@@ -5,14 +5,16 @@
 //! Keeps: nothing.
 //! Not here: each metric itself (`outline`, `cracks`, `heights`, `pipeline`, `depth`, `cross`).
 
-use super::errors::Thorough;
+use super::errors::{Cross, Thorough};
 use super::frame::Measure;
 use super::rays::Grid;
 use super::reference::MakePage;
 use super::screen::Screen;
+use super::share::share;
 use super::spread::{Spread, Where};
 use super::{cracks, cross, depth, heights, outline, pipeline};
 use overfly_core::frame::{FrameOutput, Terrain};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The frame that is measured.
 pub struct Shot<'a> {
@@ -36,37 +38,56 @@ pub(super) fn measure(measure: &Measure, shot: &Shot<'_>, due: [bool; 2]) -> Opt
     if !thorough {
         return None;
     }
-    let mut all = Thorough::default();
-    let of_pages = |all: &mut Thorough| {
-        if cross {
-            all.cross = cross::measure(measure, shot);
-        }
-        all.h1_m = heights::queries(measure, shot);
-        [all.h2_gear_m, all.h2_near_m, all.h2_far_m, all.h2_step_m] = heights::mesh(measure, shot);
+    let all = Mutex::new(Thorough::default());
+    let of_pages = || {
+        let found = if cross { cross::measure(measure, shot) } else { Cross::default() };
+        let h1_m = heights::queries(measure, shot);
+        let [gear_m, near_m, far_m, step_m] = heights::mesh(measure, shot);
+        let mut all = lock(&all);
+        (all.cross, all.h1_m) = (found, h1_m);
+        (all.h2_gear_m, all.h2_near_m) = (gear_m, near_m);
+        (all.h2_far_m, all.h2_step_m) = (far_m, step_m);
     };
-    let of_mesh = |all: &mut Thorough| {
-        (all.e4_px, all.e4_lost) = outline::measure(measure, shot);
+    let of_outline = || {
+        let (e4_px, lost) = outline::measure(measure, shot);
+        let mut all = lock(&all);
+        (all.e4_px, all.e4_lost) = (e4_px, lost);
+    };
+    let of_structure = || {
         let cracks = cracks::Cracks::of(&measure.now.drawn);
+        let mut all = lock(&all);
         (all.c1_edges, all.c2_junctions) = (cracks.edges, cracks.junctions);
-        all.c3_points = cracks::points_apart(&mut cracks::uploaded(shot.terrain, shot.output));
-        [all.m32_px, all.f32_px] = pipeline::arithmetic(measure, shot);
-        (all.j1_px, all.j1_step_px) = pipeline::jitter(measure, shot);
-        all.depths = depth::measure(measure, shot);
     };
-    // Making pages takes about as long as all the rest.
-    if measure.settings.threads > 1 {
-        let mut pages = Thorough::default();
-        std::thread::scope(|scope| {
-            scope.spawn(|| of_pages(&mut pages));
-            of_mesh(&mut all);
-        });
-        let Thorough { cross, h1_m, h2_gear_m, h2_near_m, h2_far_m, h2_step_m, .. } = pages;
-        all = Thorough { cross, h1_m, h2_gear_m, h2_near_m, h2_far_m, h2_step_m, ..all };
-    } else {
-        of_pages(&mut all);
-        of_mesh(&mut all);
-    }
-    Some(all)
+    let of_points = || {
+        let apart = cracks::points_apart(&mut cracks::uploaded(shot.terrain, shot.output));
+        lock(&all).c3_points = apart;
+    };
+    let of_arithmetic = || {
+        let drawn = pipeline::drawn(measure, shot);
+        let [bytes_px, whole_px] = pipeline::arithmetic(measure, shot, &drawn);
+        let (j1_px, step_px) = pipeline::jitter(measure, shot, &drawn);
+        let mut all = lock(&all);
+        (all.m32_px, all.f32_px) = (bytes_px, whole_px);
+        (all.j1_px, all.j1_step_px) = (j1_px, step_px);
+    };
+    let of_depths = || {
+        let depths = depth::measure(measure, shot);
+        lock(&all).depths = depths;
+    };
+    // Making pages takes about as long as all the rest, so it begins first.
+    let parts: [&(dyn Fn() + Sync); 6] =
+        [&of_pages, &of_outline, &of_structure, &of_arithmetic, &of_points, &of_depths];
+    share(parts.len(), measure.settings.threads, |at| parts[at]());
+    Some(all.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+fn lock(all: &Mutex<Thorough>) -> MutexGuard<'_, Thorough> {
+    all.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The spread of values, and where the greatest of them was seen; only that one is asked for.
+pub(super) fn spread_at(values: &[f64], at: impl FnOnce(usize) -> Where) -> Spread {
+    Spread::of(&mut values.to_vec(), at)
 }
 
 /// The spread of values that were each seen somewhere.
