@@ -30,6 +30,15 @@ pub struct Generator {
     sea: bool,
 }
 
+/// What no probe shows, by odd and even levels, metres.
+#[derive(Clone, Copy)]
+struct Unseen {
+    /// Of the ground.
+    hidden_m: [f64; 2],
+    /// Of the ellipsoid under the triangles.
+    sagitta_m: [f64; 2],
+}
+
 /// Sine of the slope that is half rock, as far as steepness goes.
 const STEEP: f64 = 0.4;
 
@@ -202,24 +211,26 @@ impl Generator {
         for (j, i) in (0..BOUND_SIDE).flat_map(|j| (0..BOUND_SIDE).map(move |i| (j, i))) {
             let at = BOUND_STRIDE * j * PAGE_SIDE + BOUND_STRIDE * i;
             let point = page.key.sample(BOUND_STRIDE * i, BOUND_STRIDE * j);
-            let seen = self.seen_bound(&probes.around(i, j), f64::from(page.heights_m[at]), {
-                self.sagitta_m(page.key, point)
-            });
             let bound = &mut page.bounds[j * BOUND_SIDE + i];
-            let min = |a: f32, b: f32| if b < a { b } else { a };
-            let error = |octaves_m: f32, seen_m: f32| {
-                min(octaves_m, seen_m + narrow(HIDDEN * f64::from(octaves_m)))
+            let hidden = |octaves_m: f32| HIDDEN * f64::from(octaves_m);
+            let unseen = Unseen {
+                hidden_m: [bound.error_odd_m, bound.error_even_m].map(hidden),
+                sagitta_m: self.sagitta_m(page.key, point),
             };
+            let height_m = f64::from(page.heights_m[at]);
+            let seen = self.seen_bound(&probes.around(i, j), height_m, unseen);
+            let min = |a: f32, b: f32| if b < a { b } else { a };
             *bound = Bound {
-                error_odd_m: error(bound.error_odd_m, seen.error_odd_m),
-                error_even_m: error(bound.error_even_m, seen.error_even_m),
+                error_odd_m: min(bound.error_odd_m, seen.error_odd_m),
+                error_even_m: min(bound.error_even_m, seen.error_even_m),
                 variation_m: min(bound.variation_m, seen.variation_m),
             };
         }
     }
 
-    /// The bound that follows from what was seen within reach.
-    fn seen_bound(&self, found: &Findings, height_m: f64, sagitta_m: [f64; 2]) -> Bound {
+    /// The bound that follows from what was seen within reach, and from what was not.
+    fn seen_bound(&self, found: &Findings, height_m: f64, unseen: Unseen) -> Bound {
+        let Unseen { hidden_m, sagitta_m } = unseen;
         let [low_m, high_m] = found.range_m;
         let residual_m = found.residual_m.map(|residual_m| surprise(self.bed.style) * residual_m);
         // Between probes the ground may rise by another block's relief.
@@ -228,10 +239,12 @@ impl Generator {
         let (below_m, above_m) = (height_m - low_m, high_m - height_m);
         let corner_m = 0.25 * found.relief_m;
         let error = |level: usize| {
-            let drawn_m = match (self.sea && high_m < 0.0, self.sea && low_m < 0.0) {
+            let error_m = residual_m[level] + hidden_m[level];
+            // Deep water hides what hides in it.
+            let drawn_m = match (self.sea && high_m + hidden_m[0] < 0.0, self.sea && low_m < 0.0) {
                 (true, _) => 0.0,
-                (_, true) => residual_m[level] + corner_m,
-                _ => residual_m[level],
+                (_, true) => error_m + corner_m,
+                _ => error_m,
             };
             narrow((drawn_m + sagitta_m[level]) * ROUNDING)
         };
