@@ -52,11 +52,19 @@ impl Goal {
         }
     }
 
-    /// What is least among points that meet the goal, first things first.
-    fn price(&self, found: &Yield) -> [f64; 2] {
+    /// What is least among points that meet the goal; the triangles decide where it is the same.
+    fn price(&self, found: &Yield) -> f64 {
         match self {
-            Self::ErrorPx(_) => [found.cpu_ms[0], found.triangles],
-            Self::BudgetMs(_) => [found.error_px, found.triangles],
+            Self::ErrorPx(_) => found.cpu_ms[1],
+            Self::BudgetMs(_) => found.error_px,
+        }
+    }
+
+    /// The greatest price that is as good as the least one: times are only so well known.
+    fn as_good_as(&self, least: f64) -> f64 {
+        match self {
+            Self::ErrorPx(_) => least * 1.1 + 0.01,
+            Self::BudgetMs(_) => least,
         }
     }
 }
@@ -69,8 +77,14 @@ pub fn choose(goal: Goal, found: &[Yield]) -> Result<usize, Option<usize>> {
         let (a, b) = (key(&found[a]), key(&found[b]));
         a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
     };
-    let meeting = known.clone().filter(|&i| goal.meets(&found[i]));
-    let best = meeting.min_by(|&a, &b| by(&|y| goal.price(y), a, b));
+    let meeting: Vec<usize> = known.clone().filter(|&i| goal.meets(&found[i])).collect();
+    // What was not timed costs nothing that is known: its price is no number.
+    let prices = meeting.iter().map(|&i| goal.price(&found[i]));
+    let most = goal.as_good_as(prices.fold(f64::INFINITY, f64::min));
+    let fewest = |y: &Yield| [y.triangles, goal.price(y)];
+    let good =
+        meeting.iter().copied().filter(|&i| most.is_infinite() || goal.price(&found[i]) <= most);
+    let best = good.min_by(|&a, &b| by(&fewest, a, b));
     best.ok_or_else(|| known.min_by(|&a, &b| by(&|y| [goal.of(y), y.triangles], a, b)))
 }
 
@@ -147,6 +161,15 @@ mod tests {
         assert_eq!(choose(Goal::ErrorPx(1.0), &found), Ok(1));
         found[0].cpu_ms = [f64::NAN; 2];
         assert_eq!(choose(Goal::BudgetMs(9.0), &found), Ok(1));
+    }
+
+    #[test]
+    fn of_times_that_cannot_be_told_apart_the_fewest_triangles_are_the_cheapest() {
+        let found = [point(0.3, 4e5, 0.50), point(0.6, 1e5, 0.52), point(0.9, 5e4, 0.60)];
+        assert_eq!(choose(Goal::ErrorPx(1.0), &found), Ok(1));
+        assert_eq!(choose(Goal::ErrorPx(0.5), &found), Ok(0));
+        let untimed = found.map(|y| Yield { cpu_ms: [f64::NAN; 2], ..y });
+        assert_eq!(choose(Goal::ErrorPx(1.0), &untimed), Ok(2));
     }
 
     #[test]

@@ -166,7 +166,8 @@ pub fn law_points(base: &Point) -> Vec<Point> {
     let sizes = [5000, 10_000, 20_000, 50_000, 100_000, 200_000].map(Turn::Triangles);
     let tolerances = [4.0, 8.0, 16.0, 32.0].map(Turn::Tolerance);
     let points = sizes.iter().chain(&tolerances).map(|turn| small.clone().turned(turn));
-    points.filter(|point| point.check(base).is_ok()).collect()
+    let finest = small.clone().turned(&Turn::Tolerance(2.0)).turned(&Turn::Triangles(400_000));
+    points.chain([finest]).filter(|point| point.check(base).is_ok()).collect()
 }
 
 /// The points of a sweep, the base first: one knob at a time around it, or every value with every

@@ -101,16 +101,26 @@ fn of_depth<'a>(
     entries.iter().filter(belongs).copied()
 }
 
-/// Triangles and error from 5000 triangles, as whole leaves, to 200 000.
+/// A mesh of fewer leaves is spent on closing around the planet, whatever the laws say: 1250, or 5000
+/// triangles at patch depth 2, less the one that would not fit any more.
+const LEAVES_LEAST: f64 = 1249.0;
+
+fn leaves(triangles: f64, patch_depth: u8) -> f64 {
+    triangles / f64::from(1_u32 << patch_depth)
+}
+
+/// Triangles and error to 200 000 triangles.
 fn errors(base: &Point, entries: &[&Entry], patch_depth: u8) -> Vec<[f64; 2]> {
     let found = of_depth(base, entries, patch_depth).map(|entry| entry.found);
     let decided = found.filter(|y| y.budget_decides() || y.tolerance_decides());
-    let in_range = decided.filter(|y| (4_900.0..=200_000.0).contains(&y.triangles));
+    let in_range = decided
+        .filter(|y| leaves(y.triangles, patch_depth) >= LEAVES_LEAST && y.triangles <= 200_000.0);
     in_range.map(|y| [y.triangles, y.rms_px]).collect()
 }
 
 fn tolerances(base: &Point, entries: &[&Entry], patch_depth: u8) -> Vec<[f64; 2]> {
     let found = of_depth(base, entries, patch_depth).map(|entry| entry.found);
-    let free = found.filter(|y| y.tolerance_decides());
+    let free =
+        found.filter(|y| y.tolerance_decides() && leaves(y.triangles, patch_depth) >= LEAVES_LEAST);
     free.map(|y| [y.tolerance_px, y.triangles]).collect()
 }
