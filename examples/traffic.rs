@@ -238,6 +238,8 @@ fn map(world: &World, town: Geodetic, body: &Ellipsoid) -> String {
     };
     let rows = counts.iter().map(|row| row.iter().map(sign).chain(['\n']).collect::<String>());
     let mean_deg = (leaning_rad / standing as f64).to_degrees();
+    // A sum with 0 is never -0.
+    let [lowest_m, highest_m] = [lowest_m, highest_m].map(|m: f64| (m * 10.0).round() / 10.0 + 0.0);
     rows.chain([format!(
         "from {lowest_m:.1} m to {highest_m:.1} m, leaning {mean_deg:.1} degrees on average\n"
     )])

@@ -46,7 +46,7 @@ use crate::core::ground::{Ground, Query, Readiness, Region, RegionFault};
 use crate::core::inspect::PatchInfo;
 use crate::core::scene::{FrameParts, extract, world_of};
 use crate::core::settings::SceneSettings;
-use crate::jobs::{Graph, Span, Spans, Team};
+use crate::jobs::{Graph, Span, Spans, StageId, Team};
 use crate::render_vk::{Backdrop, DrawError, DrawReport, Overlay, Picture, Renderer, Show};
 use crate::replay::Flight;
 use loader::Loader;
@@ -110,6 +110,20 @@ impl Drawing {
     }
 }
 
+/// The last stage of frames that have a renderer.
+fn record_drawing(house: &House, team: &Team<'_>) {
+    let mut drawing = house.drawing.lock();
+    let mut output = house.terrain.output().lock();
+    let Some(renderer) = &mut drawing.renderer else { return };
+    renderer.note_built(&output.built);
+    renderer.note_tiles(&output.tiles);
+    if let Some(view) = drawing.view.and_then(|index| output.views.get(index)) {
+        drawing.report = drawing.draw(&house.terrain, (view, output.time_ms), team);
+    }
+    let totals = drawing.renderer.as_ref().map(Renderer::device_totals);
+    output.device = totals.unwrap_or_default();
+}
+
 /// Lends what a picture of a view of a terrain is made from.
 fn lend<R>(
     terrain: &Terrain,
@@ -137,6 +151,8 @@ fn lend<R>(
 pub struct Overfly {
     house: House,
     graph: Graph<House>,
+    /// Its last stage where there is no renderer.
+    placed: StageId,
     workers: Arc<jobs::Workers>,
     sources: Arc<Sources>,
     ground: ResidentGround,
@@ -162,22 +178,11 @@ impl Overfly {
         let terrain = Terrain::new(settings, sources.generator());
         let mut graph = Graph::new();
         let placed = add_stages(&mut graph, |house: &House| &house.terrain);
-        graph.stage(RECORD, &[placed], |house: &House, team| {
-            let mut drawing = house.drawing.lock();
-            let mut output = house.terrain.output().lock();
-            let Some(renderer) = &mut drawing.renderer else { return };
-            renderer.note_built(&output.built);
-            renderer.note_tiles(&output.tiles);
-            if let Some(view) = drawing.view.and_then(|index| output.views.get(index)) {
-                drawing.report = drawing.draw(&house.terrain, (view, output.time_ms), team);
-            }
-            let totals = drawing.renderer.as_ref().map(Renderer::device_totals);
-            output.device = totals.unwrap_or_default();
-        });
         let pages_max = terrain.limits().pages;
         Ok(Self {
             house: House { terrain, drawing: Mutex::default() },
             graph,
+            placed,
             workers: Arc::new(workers.start().map_err(OpenError::Workers)?),
             ground: ResidentGround::new(settings.body, settings.sea),
             requests: Requests::new(sources.clone(), pages_max),
@@ -194,7 +199,10 @@ impl Overfly {
     /// The renderer that shall draw from now on; its settings must be made for this scene.
     pub fn set_renderer(&mut self, mut renderer: Renderer) {
         renderer.note_tiles(&self.house.terrain.tiles());
-        self.house.drawing.lock().renderer = Some(renderer);
+        let before = self.house.drawing.get_mut().renderer.replace(renderer);
+        if before.is_none() {
+            self.graph.stage(RECORD, &[self.placed], record_drawing);
+        }
     }
 
     /// Runs one frame. Pages are taken out of `input.arrived`.

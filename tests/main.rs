@@ -31,6 +31,7 @@ mod contracts {
     #[path = "../../archive/tests/contracts/server.rs"]
     mod server;
     mod serving;
+    mod sparing;
     mod trading;
     mod validation;
     mod window;

@@ -9,8 +9,8 @@ use crate::error::{DrawError, Fault, StartError};
 use crate::imagery::{Imagery, TileStaging};
 use crate::matrices::{Fixed, ViewTerms};
 use crate::overlay::OverlayVertex;
-use crate::passes::{PassInfo, Passes};
-use crate::picture::{Picture, Show};
+use crate::passes::{Beside, PassInfo, Passes};
+use crate::picture::{Backdrop, Picture, Show};
 use crate::record::Plan;
 use crate::rings::Rings;
 use crate::settings::RendererSettings;
@@ -51,7 +51,7 @@ pub(crate) struct InFlight {
 }
 
 impl Drawing {
-    /// Takes all memory and makes the pipelines of a plain picture.
+    /// Takes all memory and makes the ground's pipeline.
     pub(crate) fn new(
         device: &Arc<Device>,
         settings: &RendererSettings,
@@ -122,7 +122,12 @@ impl Drawing {
         let Self { settings, passes, .. } = self;
         let info = PassInfo { device: &self.device, into: self.into, settings };
         let is_debug = picture.show != Show::Shaded;
-        passes.complete(&info, (is_debug, !picture.overlay.is_empty()))?;
+        let beside = Beside {
+            sky: picture.backdrop == Backdrop::Sky,
+            debug: is_debug,
+            overlay: !picture.overlay.is_empty(),
+        };
+        passes.complete(&info, beside)?;
         let mut lists: [&[u32]; RANGES_MAX as usize] = [&[]; RANGES_MAX as usize];
         let lists = &mut lists[..picture.view.ranges.len()];
         if picture.show == Show::Culled {

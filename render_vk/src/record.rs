@@ -158,7 +158,8 @@ impl<'a> Ready<'a> {
 
     fn sky(self, buffer: vk::CommandBuffer) {
         let range = self.in_flight.plan.farthest();
-        self.bind(buffer, range, self.drawing.passes.sky.handle);
+        let pipeline = self.drawing.passes.sky.as_ref().expect("made before it is recorded");
+        self.bind(buffer, range, pipeline.handle);
         // SAFETY: the pipeline bound above needs no vertex buffer.
         unsafe { self.drawing.device.handle.cmd_draw(buffer, 3, 1, 0, 0) };
     }

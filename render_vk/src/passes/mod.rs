@@ -2,7 +2,7 @@
 //!
 //! In:    a subpass to draw into, compiled shaders, settings.
 //! Out:   [`Passes`].
-//! Keeps: layouts; the pipelines of the plain picture, others once they were asked for.
+//! Keeps: layouts; the ground's pipeline, others once they were asked for.
 //! Not here: recording (`record`).
 
 mod overlay;
@@ -47,13 +47,21 @@ pub(crate) struct Passes {
     pub(crate) imagery: Option<SetLayout>,
     pub(crate) layout: Layout,
     pub(crate) terrain: Pipeline,
-    pub(crate) sky: Pipeline,
+    pub(crate) sky: Option<Pipeline>,
     pub(crate) debug: Option<Pipeline>,
     pub(crate) overlay: Option<Pipeline>,
 }
 
+/// What a picture has beside the ground.
+#[derive(Clone, Copy)]
+pub(crate) struct Beside {
+    pub(crate) sky: bool,
+    pub(crate) debug: bool,
+    pub(crate) overlay: bool,
+}
+
 impl Passes {
-    /// The pipelines of a plain picture.
+    /// The pipeline of the ground.
     pub(crate) fn new(info: &PassInfo<'_>, one_off: &mut OneOff) -> Result<Self, Fault> {
         let device = info.device;
         let uniform = vk::DescriptorType::UNIFORM_BUFFER;
@@ -76,16 +84,16 @@ impl Passes {
         let layout = Layout::new(device, "picture", &create)?;
         let detail = Detail::new(device, one_off)?;
         let terrain = terrain::pipeline(info, &layout, false)?;
-        let sky = sky::pipeline(info, &layout)?;
-        Ok(Self { detail, view, infos, imagery, layout, terrain, sky, debug: None, overlay: None })
+        let (sky, debug, overlay) = (None, None, None);
+        Ok(Self { detail, view, infos, imagery, layout, terrain, sky, debug, overlay })
     }
 
-    /// Makes what a picture needs beyond a plain one, the first time.
-    pub(crate) fn complete(
-        &mut self,
-        info: &PassInfo<'_>,
-        (debug, overlay): (bool, bool),
-    ) -> Result<(), Fault> {
+    /// Makes what a picture needs beside the ground, the first time.
+    pub(crate) fn complete(&mut self, info: &PassInfo<'_>, beside: Beside) -> Result<(), Fault> {
+        let Beside { sky, debug, overlay } = beside;
+        if sky && self.sky.is_none() {
+            self.sky = Some(sky::pipeline(info, &self.layout)?);
+        }
         if debug && self.debug.is_none() {
             self.debug = Some(terrain::pipeline(info, &self.layout, true)?);
         }
@@ -97,7 +105,8 @@ impl Passes {
 
     /// How many pipelines there are.
     pub(crate) fn count(&self) -> u32 {
-        2 + u32::from(self.debug.is_some()) + u32::from(self.overlay.is_some())
+        let others = [&self.sky, &self.debug, &self.overlay];
+        others.into_iter().flatten().fold(1, |count, _| count + 1)
     }
 }
 
