@@ -13,6 +13,7 @@ mod contracts {
     mod command_line;
     mod cracks;
     mod depths;
+    mod drawn;
     mod embedding;
     mod examples;
     mod extremes;

@@ -16,7 +16,8 @@ pub struct Grid {
     /// Rows.
     pub rows: u32,
     size_px: [f64; 2],
-    seed: u64,
+    /// None where rays go through the middles of strata.
+    seed: Option<u64>,
 }
 
 impl Grid {
@@ -30,7 +31,12 @@ impl Grid {
             count.max(1)
         };
         let (columns, rows) = (across(width), across(height));
-        Self { columns, rows, size_px, seed: mix(seed ^ mix(frame)) }
+        Self { columns, rows, size_px, seed: Some(mix(seed ^ mix(frame))) }
+    }
+
+    /// The middles of all pixels, where a rasteriser looks.
+    pub fn of_pixels([columns, rows]: [u32; 2]) -> Self {
+        Self { columns, rows, size_px: [columns, rows].map(f64::from), seed: None }
     }
 
     /// How many rays.
@@ -45,12 +51,15 @@ impl Grid {
 
     /// Pixel of ray (column, row).
     pub fn pixel(&self, column: u32, row: u32) -> DVec2 {
-        let bits = mix(self.seed.wrapping_add(u64::from(row) << 32 | u64::from(column)));
         let share = |bits: u64| (bits & 0xffff_ffff) as f64 / f64::from(u32::MAX);
+        let [right, down] = self.seed.map_or([0.5; 2], |seed| {
+            let bits = mix(seed.wrapping_add(u64::from(row) << 32 | u64::from(column)));
+            [share(bits), share(bits >> 32)]
+        });
         let [width, height] = self.size_px;
         DVec2::new(
-            (f64::from(column) + share(bits)) * width / f64::from(self.columns),
-            (f64::from(row) + share(bits >> 32)) * height / f64::from(self.rows),
+            (f64::from(column) + right) * width / f64::from(self.columns),
+            (f64::from(row) + down) * height / f64::from(self.rows),
         )
     }
 
