@@ -75,25 +75,11 @@ ovf_ground ground_around(ovf_terrain terrain, double lat_rad, double lon_rad) {
     return ground;
 }
 
-} // namespace
-
-int main(int count, char **words) try {
-    if (count != 3) {
-        std::fprintf(stderr, "usage: jsbsim_ground JSBSIM_ROOT SCENE_OR_PRESET\n");
-        return 2;
-    }
-    const std::string scene_name = words[2];
-    const bool is_preset = scene_name == "earth" || scene_name == "moon" || scene_name == "small";
-    ovf_scene scene{};
-    scene.struct_size = sizeof scene;
-    (is_preset ? scene.preset : scene.path) = scene_name.c_str();
-    ovf_terrain terrain{};
-    gear::must(ovf_terrain_new_v1(&scene, nullptr, &terrain));
-    const double lat_rad = 0.8, lon_rad = 0.2;
-    const ovf_ground ground = ground_around(terrain, lat_rad, lon_rad);
-
+/* A minute on the brakes. JSBSim is gone when it returns: it asks for its height above ground until the
+ * very end, so the snapshot must outlive it. */
+int park(const char *root, ovf_ground ground, double lat_rad, double lon_rad) {
     JSBSim::FGFDMExec fdm;
-    fdm.SetRootDir(SGPath(words[1]));
+    fdm.SetRootDir(SGPath(root));
     fdm.SetAircraftPath(SGPath("aircraft"));
     fdm.SetEnginePath(SGPath("engine"));
     fdm.SetSystemsPath(SGPath("systems"));
@@ -121,9 +107,29 @@ int main(int count, char **words) try {
                         fdm.GetPropagate()->GetDistanceAGL());
         }
     }
+    return 0;
+}
+
+} // namespace
+
+int main(int count, char **words) try {
+    if (count != 3) {
+        std::fprintf(stderr, "usage: jsbsim_ground JSBSIM_ROOT SCENE_OR_PRESET\n");
+        return 2;
+    }
+    const std::string scene_name = words[2];
+    const bool is_preset = scene_name == "earth" || scene_name == "moon" || scene_name == "small";
+    ovf_scene scene{};
+    scene.struct_size = sizeof scene;
+    (is_preset ? scene.preset : scene.path) = scene_name.c_str();
+    ovf_terrain terrain{};
+    gear::must(ovf_terrain_new_v1(&scene, nullptr, &terrain));
+    const double lat_rad = 0.8, lon_rad = 0.2;
+    const ovf_ground ground = ground_around(terrain, lat_rad, lon_rad);
+    const int code = park(words[1], ground, lat_rad, lon_rad);
     gear::must(ovf_ground_destroy(ground));
     gear::must(ovf_terrain_destroy(terrain));
-    return 0;
+    return code;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;
