@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn laws_are_seen_by_small_leaves() {
         let points = law_points(&base());
-        assert_eq!(points.len(), 10);
+        assert_eq!(points.len(), 11);
         assert!(points.iter().all(|point| point.scene.lod.patch_depth == 2));
     }
 
