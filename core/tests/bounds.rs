@@ -68,33 +68,58 @@ fn worst_ratios(rig: &Rig, body: &Ellipsoid, sea: bool) -> ([f64; 2], u32) {
     (worst, u32::try_from(points).unwrap())
 }
 
-#[test]
-fn no_triangle_is_farther_from_the_ground_than_its_bound() {
-    let kinds = [(Style::Earthlike, true), (Style::Cratered, false)];
-    for ((style, sea), patch_depth) in kinds.into_iter().flat_map(|kind| [(kind, 0), (kind, 4)]) {
+/// A planet and how often a leaf of its mesh is halved.
+struct Case {
+    style: Style,
+    seed: u64,
+    patch_depth: u8,
+}
+
+impl Case {
+    /// From some places: the worst ratios on land and on water.
+    fn worst_ratios(&self) -> [f64; 2] {
+        let &Self { style, seed, patch_depth } = self;
         let mut settings = scene(patch_depth, 60_000);
-        settings.sea = sea;
-        settings.lod.tolerance.0 = 0.1;
-        let (seed, relief, finest_m, detail) = (2029, 1.0, 0.2, 1.0);
+        settings.sea = style == Style::Earthlike;
+        settings.lod.tolerance.0 = 0.02;
+        let (relief, finest_m, detail) = (1.0, 0.2, 1.0);
         settings.sources =
             vec![SourceSettings::Procedural { seed, style, relief, finest_m, detail }];
         let body = settings.body;
         let mut rig = Rig::new(&settings, 1);
         let mut worst = [0.0_f64; 2];
-        for (lat, lon, height_m) in
-            [(46.8, -121.8, 2_900.0), (46.8, -121.8, 300_000.0), (20.0, -95.0, 30_000.0)]
-        {
+        for (lat, lon, height_m) in [
+            (46.8, -121.8, 2_900.0),
+            (46.8, -121.8, 300_000.0),
+            (20.0, -95.0, 30_000.0),
+            (-70.0, 95.0, 100_000.0),
+        ] {
             let at = Geodetic::from_degrees(lat, lon, height_m);
             rig.settle(&[view(&body, at, 30.0, -35.0)]);
-            let (ratios, points) = worst_ratios(&rig, &body, sea);
+            let (ratios, points) = worst_ratios(&rig, &body, settings.sea);
             assert!(points > 40_000, "{points}");
             worst = [worst[0].max(ratios[0]), worst[1].max(ratios[1])];
         }
-        let [land, water] = worst;
-        let what = format!("{style:?}, k = {patch_depth}: land {land:.3}, water {water:.3}");
+        worst
+    }
+}
+
+#[test]
+fn no_triangle_is_farther_from_the_ground_than_its_bound() {
+    // Seeds 4 and 5 have the gentle ground with most knolls of the first nine.
+    let planets = [
+        (Style::Earthlike, 2029),
+        (Style::Earthlike, 4),
+        (Style::Earthlike, 5),
+        (Style::Cratered, 2029),
+    ];
+    for ((style, seed), patch_depth) in planets.into_iter().flat_map(|of| [(of, 0), (of, 4)]) {
+        let [land, water] = Case { style, seed, patch_depth }.worst_ratios();
+        let what = format!("{style:?} {seed}, k = {patch_depth}: land {land:.3}, water {water:.3}");
         println!("error over bound, {what}");
         assert!(land <= 1.0 && water <= 1.0, "{what}");
-        assert!(land > 0.3 && (water > 0.3 || !sea), "a bound far too large is no bound: {what}");
+        let is_dry = style == Style::Cratered;
+        assert!(land > 0.3 && (water > 0.3 || is_dry), "a bound far too large is no bound: {what}");
     }
 }
 

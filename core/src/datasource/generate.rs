@@ -10,7 +10,7 @@ use super::compose::{Bed, Ground, Need, Plots, Scope, cell_of, geoid_doubt_m, ho
 use super::facts::ArchiveFacts;
 use super::key::{PAGE_SIDE, PageKey};
 use super::page::{BOUND_SIDE, BOUND_STRIDE, Bound, Origin, Page, SAMPLES, Survey};
-use super::probes::{Findings, HIDDEN, Probes, Site, surprise};
+use super::probes::{Findings, Probes, Site, Spot, hidden, surprise};
 use super::procedural::detail::Detail;
 use super::procedural::{Planet, Style};
 use super::tile::Tile;
@@ -30,15 +30,23 @@ pub struct Generator {
     sea: bool,
 }
 
-/// What no probe shows, by odd and even levels, metres.
+/// What no probe shows, by [`Levels`], metres.
 #[derive(Clone, Copy)]
 struct Unseen {
     /// Of the ground.
-    hidden_m: [f64; 2],
+    hidden_m: Levels,
     /// Of the ellipsoid under the triangles.
-    sagitta_m: [f64; 2],
+    sagitta_m: Levels,
+    /// Whether edges are longer than [`WIDE_M`].
+    is_wide: bool,
 }
 
+/// Odd and even levels of a page, and all that finer pages serve.
+type Levels = [f64; 3];
+
+/// Between probes of wider cells whole mountains stand by the sea: there a quarter of what any block
+/// rises counts too. Metres.
+const WIDE_M: f64 = 1e4;
 /// Sine of the slope that is half rock, as far as steepness goes.
 const STEEP: f64 = 0.4;
 
@@ -198,31 +206,41 @@ impl Generator {
             }
         }
         if self.bed.is_procedural() {
-            self.tighten(page, plots);
+            self.tighten(page, &grounds, plots);
         }
     }
 
     /// Lowers the bounds of a page of the planet to what the ground around its samples shows.
-    fn tighten(&self, page: &mut Page, plots: &mut Plots<'_>) {
-        let site = Site { key: page.key, patch_depth: self.patch_depth };
-        let grounds_m =
-            |points: &[IVec3]| plots.grounds(points).iter().map(|g| g.height_m).collect();
-        let Some(probes) = Probes::new(site, &page.heights_m, grounds_m) else { return };
+    fn tighten(&self, page: &mut Page, own: &[Ground], plots: &mut Plots<'_>) {
+        let site = Site {
+            key: page.key,
+            patch_depth: self.patch_depth,
+            style: self.bed.style,
+            sea: self.sea,
+        };
+        let spot =
+            |ground: &Ground| Spot { height_m: ground.height_m, ruggedness: ground.ruggedness };
+        let own: Vec<_> = own.iter().map(spot).collect();
+        let look = |points: &[IVec3]| plots.grounds(points).iter().map(spot).collect();
+        let Some(probes) = Probes::new(site, &own, look) else { return };
         for (j, i) in (0..BOUND_SIDE).flat_map(|j| (0..BOUND_SIDE).map(move |i| (j, i))) {
             let at = BOUND_STRIDE * j * PAGE_SIDE + BOUND_STRIDE * i;
-            let point = page.key.sample(BOUND_STRIDE * i, BOUND_STRIDE * j);
             let bound = &mut page.bounds[j * BOUND_SIDE + i];
-            let hidden = |octaves_m: f32| HIDDEN * f64::from(octaves_m);
+            let found = probes.around(i, j);
+            let point = page.key.sample(BOUND_STRIDE * i, BOUND_STRIDE * j);
+            let Scope { edges_m, .. } = self.scope(page.key, point);
             let unseen = Unseen {
-                hidden_m: [bound.error_odd_m, bound.error_even_m].map(hidden),
-                sagitta_m: self.sagitta_m(page.key, point),
+                hidden_m: self.hidden_m(page.key, edges_m, found.ruggedness),
+                sagitta_m: self.sagittas_m(edges_m),
+                is_wide: edges_m[0] > WIDE_M,
             };
             let height_m = f64::from(page.heights_m[at]);
-            let seen = self.seen_bound(&probes.around(i, j), height_m, unseen);
+            let seen = self.seen_bound(&found, height_m, unseen);
             let min = |a: f32, b: f32| if b < a { b } else { a };
             *bound = Bound {
                 error_odd_m: min(bound.error_odd_m, seen.error_odd_m),
                 error_even_m: min(bound.error_even_m, seen.error_even_m),
+                error_finer_m: min(bound.error_finer_m, seen.error_finer_m),
                 variation_m: min(bound.variation_m, seen.variation_m),
             };
         }
@@ -230,59 +248,79 @@ impl Generator {
 
     /// The bound that follows from what was seen within reach, and from what was not.
     fn seen_bound(&self, found: &Findings, height_m: f64, unseen: Unseen) -> Bound {
-        let Unseen { hidden_m, sagitta_m } = unseen;
+        let Unseen { hidden_m, sagitta_m, .. } = unseen;
         let [low_m, high_m] = found.range_m;
-        let residual_m = found.residual_m.map(|residual_m| surprise(self.bed.style) * residual_m);
+        let surprise = |seen_m: f64| surprise(self.bed.style) * seen_m;
+        let residual_m = self.levels(found.residual_m.map(surprise));
         // Between probes the ground may rise by another block's relief.
         let doubt_m = found.relief_m + residual_m[0];
         let (low_m, high_m) = (low_m - doubt_m, high_m + doubt_m);
         let (below_m, above_m) = (height_m - low_m, high_m - height_m);
-        let corner_m = 0.25 * found.relief_m;
-        let error = |level: usize| {
-            let error_m = residual_m[level] + hidden_m[level];
-            // Deep water hides what hides in it.
-            let drawn_m = match (self.sea && high_m + hidden_m[0] < 0.0, self.sea && low_m < 0.0) {
-                (true, _) => 0.0,
-                (_, true) => error_m + corner_m,
-                _ => error_m,
-            };
-            narrow((drawn_m + sagitta_m[level]) * ROUNDING)
-        };
+        let rise_m =
+            if unseen.is_wide && self.sea && low_m < 0.0 { 0.25 * found.relief_m } else { 0.0 };
+        let shore_m = found.shore_m.map(|cut_m| if cut_m > rise_m { cut_m } else { rise_m });
+        let shore_m = self.levels(shore_m);
+        // Deep water hides what hides in it.
+        let is_drowned = self.sea && high_m + hidden_m[0] < 0.0;
+        let [error_odd_m, error_even_m, error_finer_m] = [0, 1, 2].map(|level| {
+            let error_m = residual_m[level] + hidden_m[level] + shore_m[level];
+            narrow((if is_drowned { 0.0 } else { error_m } + sagitta_m[level]) * ROUNDING)
+        });
         Bound {
-            error_odd_m: error(0),
-            error_even_m: error(1),
+            error_odd_m,
+            error_even_m,
+            error_finer_m,
             variation_m: narrow(
                 (if below_m > above_m { below_m } else { above_m }) * ROUNDING + 1e-3,
             ),
         }
     }
 
-    /// How far triangles of odd and even levels sag below the ellipsoid at a sample, at most.
-    fn sagitta_m(&self, key: PageKey, point: IVec3) -> [f64; 2] {
+    /// What is known of the finer ones of a page's levels holds for all that are finer still.
+    fn levels(&self, [odd, even]: [f64; 2]) -> Levels {
+        // A page serves an odd level and then an even one; with single triangles the even one first.
+        [odd, even, if self.patch_depth == 0 { odd } else { even }]
+    }
+
+    /// How far chords of the ellipsoid sag, at most: those of the next finer page are half as long.
+    fn sagittas_m(&self, edges_m: [f64; 2]) -> Levels {
+        let [curvature_min, _] = self.body.curvature_radii_m();
+        let [odd_m, even_m] = edges_m.map(|edge_m| edge_m * edge_m / (8.0 * curvature_min));
+        [odd_m, even_m, if odd_m > even_m { odd_m } else { even_m } / 4.0]
+    }
+
+    /// What no probe shows where the ground is no more rugged than this wherever it was looked at.
+    fn hidden_m(&self, key: PageKey, edges_m: [f64; 2], seen: f64) -> Levels {
+        let planet = self.bed.planet.as_ref().expect("who probes has a planet");
+        // From any place to the nearest that was looked at.
+        let [_, curvature_max] = self.body.curvature_radii_m();
+        let away_m = DIAGONAL / 4.0 * f64::from(key.step()) / NORM_MIN * curvature_max;
+        let ruggedness = (seen + planet.ruggedness_slope_per_m() * away_m).min(1.0);
+        let share = hidden(ruggedness);
+        self.levels(edges_m.map(|edge_m| share * planet.residual_m(edge_m, ruggedness)))
+    }
+
+    /// What a diamond near a sample and its descendants can reach, and the longest edges there.
+    fn scope(&self, key: PageKey, point: IVec3) -> Scope {
         let step = f64::from(key.step());
         let leaf_side = step * f64::from(1_u32 << (self.patch_depth / 2));
         let reach = EXTENT_EVEN * leaf_side + DIAGONAL * step * 4.0;
         let norm = (point.as_dvec3().length() - reach).max(NORM_MIN);
-        let [curvature_min, curvature_max] = self.body.curvature_radii_m();
-        edges(self.patch_depth).map(|edge| {
-            let edge_m = edge * step / norm * curvature_max;
-            edge_m * edge_m / (8.0 * curvature_min)
-        })
+        let [_, curvature_max] = self.body.curvature_radii_m();
+        let metres = |lattice: f64| lattice / norm * curvature_max;
+        Scope {
+            reach_m: metres(reach),
+            reach_steps: reach / step,
+            edges_m: edges(self.patch_depth).map(|edge| metres(edge * step)),
+        }
     }
 
     /// The bounds around a sample, over all that a diamond near it and its descendants can reach.
     fn bound(&self, page: &mut Page, point: IVec3, ground: &Ground, plots: &Plots<'_>) -> Bound {
         let key = page.key;
-        let step = f64::from(key.step());
-        let leaf_side = step * f64::from(1_u32 << (self.patch_depth / 2));
-        let stride = DIAGONAL * step * 4.0;
-        let reach = EXTENT_EVEN * leaf_side + stride;
-        let norm = (point.as_dvec3().length() - reach).max(NORM_MIN);
-        let [curvature_min, curvature_max] = self.body.curvature_radii_m();
-        let metres = |lattice: f64| lattice / norm * curvature_max;
-        let edges_m = edges(self.patch_depth).map(|edge| metres(edge * step));
-        let scope = Scope { reach_m: metres(reach), reach_steps: reach / step, edges_m };
-        let sagitta_m = edges_m.map(|edge_m| edge_m * edge_m / (8.0 * curvature_min));
+        let scope = self.scope(key, point);
+        let edges_m = scope.edges_m;
+        let sagitta_m = self.sagittas_m(edges_m);
         if self.bed.is_procedural() {
             return self.bound_of_planet(&scope, sagitta_m, ground);
         }
@@ -293,22 +331,18 @@ impl Generator {
         let error = |level: usize| {
             let [geoid_m, _] = geoid_doubt_m(&self.bed, edges_m[level], 0.0);
             let error_m = |shore: bool| doubt.error_m[level] + corner_m(shore);
-            let relief_m = self.drawn(ground.height_m, variation_m, error_m);
-            narrow(relief_m + geoid_m + sagitta_m[level])
+            self.drawn(ground.height_m, variation_m, error_m) + geoid_m
         };
+        let error_m = self.levels([error(0), error(1)]);
         let [_, sea_level_m] = geoid_doubt_m(&self.bed, 0.0, scope.reach_m);
         if let Some(survey) = &mut page.survey {
             let widest_m = survey.sea_level_variation_m.max(narrow(sea_level_m));
             survey.sea_level_variation_m = widest_m;
         }
-        Bound {
-            error_odd_m: error(0),
-            error_even_m: error(1),
-            variation_m: narrow(variation_m * ROUNDING + 1e-3),
-        }
+        bound_of(error_m, sagitta_m, variation_m * ROUNDING + 1e-3)
     }
 
-    fn bound_of_planet(&self, scope: &Scope, sagitta_m: [f64; 2], ground: &Ground) -> Bound {
+    fn bound_of_planet(&self, scope: &Scope, sagitta_m: Levels, ground: &Ground) -> Bound {
         let planet = self.bed.planet.as_ref().expect("a scene without archives has a planet");
         let slope = planet.ruggedness_slope_per_m();
         let ruggedness = (ground.ruggedness + slope * scope.reach_m).min(1.0);
@@ -318,10 +352,10 @@ impl Generator {
             let rise_m = || planet.variation_m(edge_m, ruggedness);
             let corner_m = |shore: bool| if shore { rise_m() / 4.0 } else { 0.0 };
             let error_m = |shore: bool| planet.residual_m(edge_m, ruggedness) + corner_m(shore);
-            let relief_m = self.drawn(ground.height_m, variation_m, error_m);
-            narrow(relief_m + sagitta_m[level])
+            self.drawn(ground.height_m, variation_m, error_m)
         };
-        Bound { error_odd_m: error(0), error_even_m: error(1), variation_m: narrow(variation_m) }
+        let error_m = self.levels([error(0), error(1)]);
+        bound_of(error_m, sagitta_m, variation_m)
     }
 
     /// The error of what is drawn: none under water, that of a shore where ground and sea level
@@ -380,6 +414,12 @@ impl Generator {
 
 /// Rounding of bounds through f32, many times over.
 const ROUNDING: f64 = 1.0 + 1e-6;
+
+fn bound_of(error_m: Levels, sagitta_m: Levels, variation_m: f64) -> Bound {
+    let [error_odd_m, error_even_m, error_finer_m] =
+        [0, 1, 2].map(|level| narrow(error_m[level] + sagitta_m[level]));
+    Bound { error_odd_m, error_even_m, error_finer_m, variation_m: narrow(variation_m) }
+}
 
 /// Writes one sample.
 fn put(page: &mut Page, at: usize, ground: &Ground) {
@@ -443,8 +483,9 @@ fn content_of(page: &Page) -> u64 {
         samples.for_each(|(m, &origin)| chain.add(u64::from(m.to_bits()) << 8 | origin as u64));
     }
     for bound in &page.bounds {
-        let bits = [bound.error_odd_m, bound.error_even_m, bound.variation_m].map(f32::to_bits);
-        bits.into_iter().for_each(|b| chain.add(u64::from(b)));
+        let errors_m = [bound.error_odd_m, bound.error_even_m, bound.error_finer_m];
+        let bits = errors_m.into_iter().chain([bound.variation_m]).map(f32::to_bits);
+        bits.for_each(|b| chain.add(u64::from(b)));
     }
     if let Some(colour) = &page.colour {
         chain.add(colour.content);

@@ -26,6 +26,8 @@ pub struct Bound {
     pub error_odd_m: f32,
     /// The same for even levels.
     pub error_even_m: f32,
+    /// The same for all levels that finer pages serve: a needle stays one, sagitta does not.
+    pub error_finer_m: f32,
     /// Bound on the difference in height to any place that a descendant of a diamond drawn from
     /// this page can reach. Metres.
     pub variation_m: f32,
@@ -36,6 +38,7 @@ impl Bound {
     pub const UNKNOWN: Self = Self {
         error_odd_m: f32::INFINITY,
         error_even_m: f32::INFINITY,
+        error_finer_m: f32::INFINITY,
         variation_m: f32::INFINITY,
     };
 
@@ -44,6 +47,7 @@ impl Bound {
         Self {
             error_odd_m: max(self.error_odd_m, other.error_odd_m),
             error_even_m: max(self.error_even_m, other.error_even_m),
+            error_finer_m: max(self.error_finer_m, other.error_finer_m),
             variation_m: max(self.variation_m, other.variation_m),
         }
     }

@@ -260,7 +260,10 @@ impl Terrain {
 /// Whether a page can be drawn: heights and bounds finite, no ground below `deepest_m`. Some
 /// microseconds, little beside making one.
 fn check_page(page: &Page, deepest_m: f32) -> Result<(), ViewFault> {
-    let bounds = page.bounds.iter().flat_map(|b| [b.error_odd_m, b.error_even_m, b.variation_m]);
+    let bounds = page
+        .bounds
+        .iter()
+        .flat_map(|b| [b.error_odd_m, b.error_even_m, b.error_finer_m, b.variation_m]);
     check_all(page.key, ("height", deepest_m), page.heights_m.iter().copied())?;
     check_all(page.key, ("bound", 0.0), bounds)
 }

@@ -7,7 +7,7 @@
 
 use super::agenda::{Band, Verdict};
 use super::diamonds::{Diamond, DiamondId, Diamonds, leaf_key};
-use super::reach::{cap_of, own_cap_of, page_depth, page_is_finest};
+use super::reach::{cap_of, kids_cap_of, own_cap_of, page_depth, page_is_finest};
 use super::refine::Rule;
 use super::screen_error::{Horizon, Region, Sight, judge_leaf, judge_parent, priority_px};
 use crate::columns::{Column, Id};
@@ -256,7 +256,7 @@ impl Planet<'_> {
         let (mut low_m, mut high_m) = (floor_m, peak_m);
         // Above the finest grid of the root pages nothing is known but the body's whole relief.
         let mut error_m = peak_m - floor_m + self.horizon.curvature_m[1];
-        let mut finer_m = error_m;
+        let (mut kids_m, mut finer_m) = (error_m, error_m);
         if page_is_finest(level, self.lod.patch_depth) {
             let page =
                 self.cover.pages[id].into_iter().flatten().next().expect("a record has a side");
@@ -275,25 +275,30 @@ impl Planet<'_> {
             let is_first = level.is_multiple_of(2) == (self.lod.patch_depth == 0);
             error_m = if level.is_multiple_of(2) { even_m } else { odd_m };
             let second_m = if self.lod.patch_depth == 0 { odd_m } else { even_m };
-            // Below its second level the page knows of nothing that is less: a needle stays one.
-            finer_m = if is_first { second_m } else { error_m };
+            finer_m = f64::from(bound.error_finer_m);
+            kids_m = if is_first { second_m } else { finer_m };
         }
         for parent in record.parents().into_iter().flatten() {
             let outer = &self.cover.region[parent];
             low_m = low_m.max(outer.low_m).min(outer.high_m);
             high_m = high_m.min(outer.high_m).max(outer.low_m);
-            error_m = error_m.min(outer.finer_m);
+            error_m = error_m.min(outer.kids_m);
+            kids_m = kids_m.min(outer.finer_m);
             finer_m = finer_m.min(outer.finer_m);
         }
+        let kids_cap = kids_cap_of(level, centre);
+        let kids_m = kids_m.min(error_m);
         Region {
             normal,
             surface: self.body.surface_from_normal(normal),
             cap: cap_of(level, centre),
-            own_cap: own_cap_of(level, centre),
+            own_cap: own_cap_of(normal, diamonds.shape(id).corners(), kids_cap),
+            kids_cap,
             low_m,
             high_m,
             error_m,
-            finer_m: finer_m.min(error_m),
+            kids_m,
+            finer_m: finer_m.min(kids_m),
             tangent_m: self.horizon.tangent_m(high_m),
         }
     }

@@ -12,17 +12,17 @@
 //! descendants; 1 % is added, so that rounding cannot break the nesting.
 
 use crate::datasource::key::PAGE_BITS;
-use crate::lattice::RADIUS;
-use glam::IVec3;
+use crate::lattice::{RADIUS, normal_of};
+use glam::{DVec3, IVec3};
 
 /// Reach of an even diamond's descendants from its centre.
 pub const EXTENT_EVEN: f64 = 1.01 * 2.639_1;
 /// Reach of an odd diamond's descendants from its centre.
 pub const EXTENT_ODD: f64 = 1.01 * 1.931_9;
-/// Reach of an even diamond's own two triangles from its centre: half a steep diagonal.
-pub const OWN_EVEN: f64 = 1.01 * 1.224_8;
-/// Reach of an odd diamond's own two triangles from its centre: half a step along an axis.
-pub const OWN_ODD: f64 = 1.01 * 0.707_2;
+/// Reach of an even diamond's kids' triangles from its centre: to a kid's and half its axis.
+pub const KIDS_EVEN: f64 = 1.01 * 1.414_3;
+/// Reach of an odd diamond's kids' triangles: to a kid's centre and half its steep diagonal.
+pub const KIDS_ODD: f64 = 1.01 * 1.224_8;
 /// Longest edge of one steep diagonal of a sample cell: √6 steps.
 pub const DIAGONAL: f64 = 2.449_5;
 
@@ -44,9 +44,9 @@ pub fn cap_of(level: u8, centre: IVec3) -> f64 {
     cap(level, centre, [EXTENT_EVEN, EXTENT_ODD])
 }
 
-/// Chord on the unit sphere from the diamond's normal to the farthest normal of its two triangles.
-pub fn own_cap_of(level: u8, centre: IVec3) -> f64 {
-    cap(level, centre, [OWN_EVEN, OWN_ODD])
+/// Chord on the unit sphere from the diamond's normal to the farthest normal of its kids' triangles.
+pub fn kids_cap_of(level: u8, centre: IVec3) -> f64 {
+    cap(level, centre, [KIDS_EVEN, KIDS_ODD])
 }
 
 fn cap(level: u8, centre: IVec3, [even, odd]: [f64; 2]) -> f64 {
@@ -54,6 +54,21 @@ fn cap(level: u8, centre: IVec3, [even, odd]: [f64; 2]) -> f64 {
     let extent = side * if level.is_multiple_of(2) { even } else { odd };
     let norm = centre.as_dvec3().length() - extent;
     extent / if norm > NORM_MIN { norm } else { NORM_MIN }
+}
+
+/// Chord on the unit sphere from the diamond's normal to the farthest normal of its two triangles.
+///
+/// Their sides are arcs of great circles, so the farthest is that of a corner while all lie in one
+/// hemisphere around `normal`; at most `cap`, which is [`kids_cap_of`] the diamond.
+pub fn own_cap_of(normal: DVec3, corners: [IVec3; 4], cap: f64) -> f64 {
+    let normals = corners.map(normal_of);
+    let far = |most: f64, corner: &DVec3| {
+        let chord = (*corner - normal).length() * (1.0 + 1e-12);
+        if chord > most { chord } else { most }
+    };
+    let own = normals.iter().fold(0.0, far);
+    let is_small = normals.iter().all(|corner| corner.dot(normal) > 0.1);
+    if is_small && own < cap { own } else { cap }
 }
 
 /// Depth of the sample grid whose points are the vertices of level-`level` patches, and the
@@ -77,7 +92,7 @@ pub fn page_is_finest(level: u8, patch_depth: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::{fold, middle, normal_of};
+    use crate::lattice::{fold, middle};
 
     /// All descendants' centres of a quad, to some depth, with their levels.
     fn descend(quad: [IVec3; 4], level: u8, depth: u8, visit: &mut impl FnMut(IVec3, u8)) {

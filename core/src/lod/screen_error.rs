@@ -13,33 +13,33 @@
 //! height k is seen farther than the sum of both tangent lengths to that ball, lowered to the
 //! deepest ground. Frustum. A plane's greatest value over the region is bounded term by term.
 //! Each bound only tightens when cap and height interval shrink. A diamond's own error counts from
-//! where its own triangles may be, the lesser one of its descendants from where they may be: a
-//! kid's own error is at most its parents' lesser one, so priorities are nested.
+//! where its own triangles may be, the lesser one of its kids from where theirs may be, the least one
+//! of all others from where any descendant may be: a kid's errors are at most those of its parents'
+//! next part, so priorities are nested, and tight even where a diamond is as large as it is far.
 //!
-//! Lens. Errors are vertical. At depth z and tangents t of the picture, a vertical error e is
-//! |n⊥ − t·n_f|·e·f/z large, with the normal's parts across and along the view direction: at most
-//! A = |n⊥| + T·|n_f|, T the tangent of the corner, and at most √(1 + t²) = 1/cos θ. And z is d·cos θ.
-//! So the error is at most e·f/d times the lens min(A/c, 1/c²), c a lower bound on cos θ over the
-//! region in the picture: that of the corner, or z/D, the least depth over the greatest distance of
-//! any ground of the region. As a ball of the greatest radius of curvature M contains the ellipsoid
-//! and X(n) turns by at most M times the angle, D² ≤ (h−k)² + (M²(1 + 0.37s²) + (h + k)M + hk)s²
-//! with the chord s of both normals, negative heights counting as 0 in the product. Where an error
-//! is below the threshold even with the corner's lens, or above it with none, the lens does not
-//! matter; else it enters the slack as below.
+//! Lens. Errors are vertical. At X from the eye, with depth z = f·X along the view direction f, a
+//! vertical error e at normal n is e·|z·n − (f·n)·X|/z² large on a screen at unit depth: e/q, where
+//! q, the *lens distance*, is what the picture's middle would show the error at. All ground of the
+//! region lies in a ball of radius r around C with normals within the cap ε, so |X| ≤ D = |C| + r and,
+//! with Z a lower bound on z, q is at least each of
+//! - d·cos²θ, θ the angle of the picture's corner: as |z·n − (f·n)·X| = |f×(n×X)| ≤ |X|;
+//! - Z/A, A = |n⊥| + T·|f·n| with the normal's part n⊥ across f and the tangent T of the corner;
+//! - Z²/F, F = min(|z·n − (f·n)·X| at C + 2r + 2εD, D): that vector changes by at most 2|dX| + 2|X||dn|.
 //!
-//! Certainty. With d the distance bound, the error is on the threshold where d = R = e·f/threshold.
-//! If the eye moves by m, the heights change by at most m and √((ρ+h)(ρ+k))·|n−m| by at most λm
-//! (λ is 1 nearby, see `stretch` below), so d changes by at most λm. Where the threshold over f
-//! falls or rises by a share Δ, R changes by at most RΔ. A plane's value over the region changes by
-//! at most m, and by L·φ when its unit normal changes by φ, L the region's farthest point. The
-//! horizon's reach changes with the tangent length of the eye. Where the lens
-//! counts, the error is on the threshold where dg = R with g = max(c/A, c²). z changes by at most
-//! m + φD and D by μm, so c = z/D by at most δ = ((1 + μ)m + φD)/D downward and, while μm is below
-//! D/10, by 1.2δ upward; A by (1 + T)φ; d ≤ D. With a = max(1, 1/A), dg falls by at most
-//! a(λ + 2 + 2μ)m + a(2 + a(1 + T))dφ, and rises by at most a(1.5λ + 3 + 3μ)m +
-//! a(3 + 1.2a(1 + T))dφ while δ is below 0.4 and (1 + T)φ below A/10.
-//! So a slack in metres, minus λm, RΔ,
-//! Lφ and the tangents' change, stays positive for as long as `Lasts` tells.
+//! Z is the greater of f·C − r and d·cos θ: what is not in the picture does not count. A lens that
+//! shrinks errors is trusted up to d/max(T, 1/4), so that parents far above the threshold last.
+//! Balls are nested as caps are, so q only grows when a region shrinks.
+//!
+//! Certainty. The error is on the threshold where q = R = e·f/threshold. If the eye moves by m, the
+//! heights change by at most m and √((ρ+h)(ρ+k))·|n−m| by at most λm (λ is 1 nearby, see `stretch`
+//! below), so d changes by at most λm. Where the threshold over f falls or rises by a share Δ, R
+//! changes by at most RΔ. A plane's value over the region changes by at most m, and by L·φ when its
+//! unit normal changes by φ, L the region's farthest point. The horizon's reach changes with the
+//! tangent length of the eye. Z changes by at most (1+λ)m + Dφ, A by (1+T)φ, F by (2+2ε)m + 2Dφ; so
+//! Z − RA changes by at most (1+λ)m + (D + (1+T)R)φ. √(RF) rises by at most √(R/F)/2 times F's change,
+//! and falls by at most 1.2 times as much while F has lost no more than half. D itself changes by m,
+//! which counts as long as m is below D/10. So a slack in metres, divided by what it loses for each
+//! metre, stays positive for as long as `Lasts` tells.
 
 use super::agenda::Verdict;
 use super::wheel::{Family, Lasts, Motion};
@@ -62,9 +62,13 @@ pub struct Region {
     pub high_m: f64,
     /// Chord from `normal` to the farthest normal of the diamond's own two triangles.
     pub own_cap: f64,
+    /// The same of its kids' triangles.
+    pub kids_cap: f64,
     /// Bound on the height error of drawing the diamond unsplit, metres.
     pub error_m: f64,
-    /// Bound on that of drawing any of its descendants, metres; at most `error_m`.
+    /// Bound on that of drawing its kids, metres; at most `error_m`.
+    pub kids_m: f64,
+    /// Bound on that of drawing any of their descendants, metres; at most `kids_m`.
     pub finer_m: f64,
     /// Length of the tangent from `high_m` down to the deepest ground, metres.
     pub tangent_m: f64,
@@ -179,13 +183,8 @@ impl Sight {
 
     /// Lower bound on the distance from the eye to the ground of the region, metres.
     pub fn distance_m(&self, region: &Region) -> f64 {
-        self.distances_m(region)[1]
-    }
-
-    /// Lower bounds on the distance to the diamond's own triangles and to all of its region.
-    fn distances_m(&self, region: &Region) -> [f64; 2] {
         let chord = (self.normal - region.normal).length();
-        [region.own_cap, region.cap].map(|cap| self.distance_beyond_m(region, chord - cap))
+        self.distance_beyond_m(region, chord - region.cap)
     }
 
     /// Lower bound on the distance to ground of the region whose normal is a chord away.
@@ -213,89 +212,96 @@ impl Sight {
         self.steepness * (1.1 + (self.normal - region.normal).length())
     }
 
-    /// By how much the region is in the frustum, metres: negative outside.
-    fn frustum_margin_m(&self, region: &Region) -> f64 {
+    /// By how much each part of a region is in the frustum, metres: negative outside.
+    fn frustum_margins_m(&self, region: &Region) -> [f64; PARTS] {
         let to_surface = region.surface - self.eye;
-        let spread = 1.01 * self.horizon.curvature_m[1] * region.cap;
-        let of = |plane: &DVec3| {
+        let Region { low_m, high_m, .. } = *region;
+        let caps = caps_of(region);
+        let mut margins_m = [f64::INFINITY; PARTS];
+        for plane in &self.planes {
             let along = plane.dot(region.normal);
-            let lift = |height_m: f64| height_m * along + height_m.abs() * region.cap;
-            let (low, high) = (lift(region.low_m), lift(region.high_m));
-            plane.dot(to_surface) + spread + if low > high { low } else { high }
-        };
-        let [a, b, c, d] = [0, 1, 2, 3].map(|side| of(&self.planes[side]));
-        a.min(b).min(c.min(d))
+            let surface_m = plane.dot(to_surface);
+            for (margin_m, cap) in margins_m.iter_mut().zip(caps) {
+                let lift = |height_m: f64| height_m * along + height_m.abs() * cap;
+                let spread_m = 1.01 * self.horizon.curvature_m[1] * cap;
+                *margin_m =
+                    least(*margin_m, surface_m + spread_m + greater(lift(low_m), lift(high_m)));
+            }
+        }
+        margins_m
     }
 
-    /// What this view sees of a region.
-    fn look(&self, region: &Region) -> Look {
-        let [own_m, distance_m] = self.distances_m(region);
-        let nearest =
-            |distance_m: f64| if distance_m > self.near_m { distance_m } else { self.near_m };
-        let (own_m, all_m) = (nearest(own_m), nearest(distance_m));
-        let (own, all) = (region.error_m / own_m, region.finer_m / all_m);
-        let flat_px = if own > all { own } else { all } * self.pixels_per_radian;
-        Look { distance_m, own_m, all_m, flat_px }
+    /// What this view sees of the parts of a region.
+    fn look(&self, region: &Region) -> [Look; PARTS] {
+        let chord = (self.normal - region.normal).length();
+        let (caps, errors_m) = (caps_of(region), errors_of(region));
+        let inside_m = self.frustum_margins_m(region);
+        [0, 1, 2].map(|part| {
+            let away_m = self.distance_beyond_m(region, chord - caps[part]);
+            let above_m = self.tangent_m + region.tangent_m - away_m;
+            let (cap, error_m) = (caps[part], errors_m[part]);
+            let distance_m = greater(away_m, self.near_m);
+            Look { cap, error_m, distance_m, seen_by_m: least(above_m, inside_m[part]) }
+        })
     }
 
-    /// How the screen's plane enlarges errors of the region.
-    fn lens(&self, region: &Region) -> Lens {
-        let [_, curvature_m] = self.horizon.curvature_m;
-        let spread = 1.01 * curvature_m * region.cap;
+    /// How the screen's plane enlarges errors of a part of a region.
+    fn lens(&self, region: &Region, &Look { cap, distance_m, .. }: &Look) -> Lens {
+        let (low_m, high_m) = (region.low_m, region.high_m);
+        let tallest_m = greater(low_m.abs(), high_m.abs());
+        let ball_m =
+            (1.01 * self.horizon.curvature_m[1] + tallest_m) * cap + 0.5 * (high_m - low_m);
+        let away = region.surface - self.eye + region.normal * (0.5 * (low_m + high_m));
+        let far_m = away.length() + ball_m;
+        let depth_m = self.forward.dot(away);
+        let corner_m = distance_m * self.corner_cosine2.sqrt();
         let along = self.forward.dot(region.normal);
-        let lift = |height_m: f64| height_m * along - height_m.abs() * region.cap;
-        let (low, high) = (lift(region.low_m), lift(region.high_m));
-        let to_surface = self.forward.dot(region.surface - self.eye);
-        let depth_m = to_surface - spread + if low < high { low } else { high };
-        let chord = (self.normal - region.normal).length() + region.cap;
-        let chord = if chord < 2.0 { chord } else { 2.0 };
-        let (below, above) = (self.height_m - region.low_m, region.high_m - self.height_m);
-        let vertical = if below > above { below } else { above };
-        let h = if region.high_m > 0.0 { region.high_m } else { 0.0 };
-        let k = if self.height_m > 0.0 { self.height_m } else { 0.0 };
-        let bent = curvature_m * curvature_m * (1.0 + 0.37 * chord * chord);
-        let across = (bent + (h + k) * curvature_m + h * k) * chord * chord;
-        let far_m = (vertical * vertical + across).sqrt();
-        let cosine = if depth_m > 0.0 { depth_m / far_m } else { 0.0 };
-        let cosine2 = cosine * cosine;
-        let cosine2 = if cosine2 > self.corner_cosine2 { cosine2 } else { self.corner_cosine2 };
-        let least = |a: f64, b: f64| if a < b { a } else { b };
-        let aside = least(self.forward.cross(region.normal).length() + region.cap, 1.0);
-        let ahead = least(along.abs() + region.cap, 1.0);
-        let across = aside + self.corner_tangent * ahead;
-        let across = if across > ACROSS_MIN { across } else { ACROSS_MIN };
-        let by_across = cosine2.sqrt() / across;
-        let shrink = if by_across > cosine2 { by_across } else { cosine2 };
-        Lens { shrink, across, far_m }
+        let seen_m = (depth_m * region.normal - along * away).length();
+        let seen_m = least(seen_m + 2.0 * ball_m + 2.0 * cap * far_m, far_m);
+        let aside = least(self.forward.cross(region.normal).length() + cap, 1.0);
+        let ahead = least(along.abs() + cap, 1.0);
+        Lens {
+            distance_m,
+            depth_m: greater(depth_m - ball_m, corner_m),
+            across: greater(aside + self.corner_tangent * ahead, SHRINK_MIN),
+            seen_m: greater(seen_m, SHRINK_MIN * far_m),
+            far_m,
+            cap,
+        }
     }
 
-    /// Bound on the change of the greatest distance for each metre that the eye moves.
-    fn stretch_far(&self, region: &Region) -> f64 {
-        let [least, greatest] = self.horizon.curvature_m;
-        let chord = (self.normal - region.normal).length() + region.cap;
-        1.5 * (greatest / least) * self.stretch(region) * (1.0 + chord)
+    /// What a lens that shrinks errors is trusted with, over the distance.
+    fn shrink_max(&self) -> f64 {
+        1.0 / greater(least(self.corner_tangent, 1.0), SHRINK_MIN)
     }
 
-    /// By how much the region is seen: the lesser margin before horizon and frustum, metres.
-    /// Negative where it is hidden; then the greater of both counts.
-    fn seen_by_m(&self, region: &Region, look: &Look) -> f64 {
-        let above_m = (self.tangent_m + region.tangent_m) - look.distance_m;
-        let inside_m = self.frustum_margin_m(region);
-        above_m.min(inside_m)
+    /// The distance at which the middle of the picture would show an error as large.
+    fn lens_distance_m(&self, lens: &Lens) -> f64 {
+        let corner_m = lens.distance_m * self.corner_cosine2;
+        let across_m = lens.depth_m / lens.across;
+        let seen_m = lens.depth_m * lens.depth_m / lens.seen_m;
+        let most_m = lens.distance_m * self.shrink_max();
+        least(greater(greater(corner_m, across_m), seen_m), most_m)
+    }
+
+    /// Error in pixels of a part of a region, and its lens where it is seen.
+    fn part(&self, region: &Region, look: &Look) -> Option<(f64, Lens)> {
+        (look.seen_by_m >= 0.0).then(|| {
+            let lens = self.lens(region, look);
+            let error_px = look.error_m * self.pixels_per_radian / self.lens_distance_m(&lens);
+            (error_px, lens)
+        })
     }
 
     /// Whether this view may see any of the region.
     pub fn sees(&self, region: &Region) -> bool {
-        self.seen_by_m(region, &self.look(region)) >= 0.0
+        self.look(region)[PARTS - 1].seen_by_m >= 0.0
     }
 
     /// Error bound of the region on this view's screen, in pixels.
     pub fn error_px(&self, region: &Region) -> f64 {
-        let look = self.look(region);
-        if self.seen_by_m(region, &look) < 0.0 {
-            return 0.0;
-        }
-        look.flat_px / self.lens(region).shrink
+        let parts = self.look(region).map(|look| self.part(region, &look));
+        worst_px(&parts)
     }
 
     /// Not less than the distance to any point of the region by which a turn moves it, metres.
@@ -313,95 +319,189 @@ impl Sight {
 
     /// For how long a leaf stays below `threshold_px` in this view, or its error.
     fn leaf(&self, region: &Region, threshold_px: f64) -> Verdict {
-        let look = self.look(region);
-        let [own_m, all_m] = self.reaches_m(region, threshold_px);
-        let scale_m = look.own_m;
-        let slack = |shrink: f64| (look.own_m * shrink - own_m).min(look.all_m * shrink - all_m);
-        if look.flat_px < threshold_px * self.corner_cosine2 {
-            let slack_m = slack(self.corner_cosine2) / self.corner_cosine2;
-            let slack_m = self.path_of(region, slack_m, scale_m);
+        let looks = self.look(region);
+        let reach_m = |look: &Look| look.error_m * self.pixels_per_radian / threshold_px;
+        let far_m = |look: &Look| look.distance_m - reach_m(look) / self.corner_cosine2;
+        let far_m = looks.iter().map(far_m).fold(f64::INFINITY, least);
+        if far_m > 0.0 {
+            let scale_m = looks[0].distance_m;
+            let slack_m = self.path_of(region, far_m, scale_m);
             return Verdict::Certain(Lasts { family: Family::Far, scale_m, slack_m });
         }
-        let seen_by_m = self.seen_by_m(region, &look);
-        if seen_by_m < 0.0 {
-            let scale_m = self.farthest_m(region).max(scale_m);
-            let slack_m = self.path_of(region, -seen_by_m, scale_m);
-            return Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m });
-        }
-        let lens = self.lens(region);
-        let error_px = look.flat_px / lens.shrink;
+        let parts = looks.map(|look| self.part(region, &look));
+        let error_px = worst_px(&parts);
         if error_px >= threshold_px {
             return Verdict::Urgent(error_px);
         }
-        let slack_m = slack(lens.shrink) - 1e-9 * lens.far_m - 1e-6;
-        let strength = lens.strength();
-        let path = self.stretch(region) + 2.0 + 2.0 * self.stretch_far(region);
-        let turn = (2.0 + strength * (1.0 + self.corner_tangent)) / path;
-        let slack_m = slack_m / (strength * path);
-        let most_m = 0.1 * self.horizon.curvature_m[0];
-        let slack_m = if slack_m < most_m { slack_m } else { most_m };
-        let scale_m = scale_m * if turn > 1.0 { turn } else { 1.0 };
-        Verdict::Certain(Lasts { family: Family::Hidden, scale_m, slack_m })
+        let stretch = self.stretch(region);
+        let margin = |part: usize| match &parts[part] {
+            None => self.sight(region, looks[part].seen_by_m).turned(),
+            Some((_, lens)) => self.below(lens, reach_m(&looks[part]), stretch),
+        };
+        let [own, kids, finer] = [0, 1, 2].map(margin);
+        self.lasts(Family::Hidden, own.and(kids).and(finer))
     }
 
-    /// Distances at which the own error and that of all descendants are on a threshold.
-    fn reaches_m(&self, region: &Region, threshold_px: f64) -> [f64; 2] {
-        [region.error_m, region.finer_m]
-            .map(|error_m| error_m * self.pixels_per_radian / threshold_px)
+    /// By how much something is seen.
+    fn sight(&self, region: &Region, slack_m: f64) -> Margin {
+        let farthest_m = self.farthest_m(region);
+        let per_m = self.stretch(region);
+        Margin { slack_m, per_m, per_radian_m: farthest_m }.rounded(farthest_m)
+    }
+
+    /// A verdict that lasts as long as a margin; the stretch counts on no longer a way than this.
+    fn lasts(&self, family: Family, margin: Margin) -> Verdict {
+        let slack_m = least(margin.path_m(), 0.1 * self.horizon.curvature_m[0]);
+        Verdict::Certain(Lasts { family, scale_m: margin.per_radian_m / margin.per_m, slack_m })
+    }
+
+    /// For how long a lens distance stays beyond `reach_m`: as long as its best bound does.
+    fn below(&self, lens: &Lens, reach_m: f64, stretch: f64) -> Margin {
+        let near = self.margin_of_distance(lens, reach_m, stretch);
+        let [corner, across, seen] = self.margins(lens, reach_m, stretch, 1.0);
+        near.and(corner.or(across).or(seen))
+    }
+
+    /// For how long a lens distance stays within `reach_m`: as long as each of its bounds does, or
+    /// the distance is near enough for any lens.
+    fn above(&self, lens: &Lens, reach_m: f64, stretch: f64) -> Margin {
+        let near = self.margin_of_distance(lens, reach_m, stretch).turned();
+        let [corner, across, seen] = self.margins(lens, reach_m, stretch, 1.2).map(Margin::turned);
+        let half = Margin {
+            slack_m: 0.5 * lens.seen_m,
+            per_m: 2.0 + 2.0 * lens.cap,
+            per_radian_m: 2.2 * lens.far_m,
+        };
+        near.or(corner.and(across).and(seen).and(half))
+    }
+
+    /// By how much the most that a lens may make of the distance is beyond `reach_m`.
+    fn margin_of_distance(&self, lens: &Lens, reach_m: f64, stretch: f64) -> Margin {
+        let slack_m = lens.distance_m - reach_m / self.shrink_max();
+        let per_radian_m = reach_m + lens.distance_m;
+        Margin { slack_m, per_m: stretch, per_radian_m }.rounded(lens.distance_m)
+    }
+
+    /// By how much each bound on the lens distance is beyond `reach_m`; `steeper` is by how much
+    /// more than its slope a root changes.
+    fn margins(&self, lens: &Lens, reach_m: f64, stretch: f64, steeper: f64) -> [Margin; 3] {
+        let tangent = 1.0 + self.corner_tangent;
+        let far_m = 1.1 * lens.far_m;
+        let corner = Margin {
+            slack_m: lens.distance_m - reach_m / self.corner_cosine2,
+            per_m: stretch,
+            per_radian_m: (reach_m + lens.distance_m) / self.corner_cosine2,
+        };
+        let across = Margin {
+            slack_m: lens.depth_m - reach_m * lens.across,
+            per_m: 1.0 + stretch,
+            per_radian_m: far_m + tangent * reach_m + reach_m * lens.across,
+        };
+        let root_m = (reach_m * lens.seen_m).sqrt();
+        let slope = steeper * root_m / lens.seen_m;
+        let seen = Margin {
+            slack_m: lens.depth_m - root_m,
+            per_m: 1.0 + stretch + slope * (1.0 + lens.cap),
+            per_radian_m: far_m * (1.0 + slope) + root_m,
+        };
+        [corner, across, seen].map(|margin| margin.within(lens.far_m))
     }
 
     /// For how long a parent stays above `threshold_px` in this view, or its error.
     fn parent(&self, region: &Region, threshold_px: f64) -> Verdict {
-        let look = self.look(region);
-        let seen_by_m = self.seen_by_m(region, &look);
-        if seen_by_m < 0.0 {
-            return Verdict::Urgent(0.0);
-        }
-        let [own_m, all_m] = self.reaches_m(region, threshold_px);
-        let slack = |shrink: f64| (own_m - look.own_m * shrink).max(all_m - look.all_m * shrink);
-        let farthest_m = self.farthest_m(region);
-        if look.flat_px > threshold_px {
-            let scale_m = farthest_m.max(own_m);
-            let slack_m = self.path_of(region, slack(1.0).min(seen_by_m), scale_m);
-            return Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m });
-        }
-        let lens = self.lens(region);
-        let error_px = look.flat_px / lens.shrink;
+        let looks = self.look(region);
+        let parts = looks.map(|look| self.part(region, &look));
+        let error_px = worst_px(&parts);
         if error_px <= threshold_px {
             return Verdict::Urgent(error_px);
         }
-        // What is left of dg, and of sight.
-        let slack_m = slack(lens.shrink) - 1e-9 * lens.far_m - 1e-6;
-        let (strength, tangent) = (lens.strength(), 1.0 + self.corner_tangent);
-        let far = self.stretch_far(region);
-        let path = 1.5 * self.stretch(region) + 3.0 + 3.0 * far;
-        let turn = (3.0 + 1.2 * strength * tangent) / path;
-        let most_m = 0.1 * look.all_m * (1.0 / far).min(lens.across / tangent);
-        let lens_m = (slack_m / (strength * path)).min(most_m);
-        let slack_m = lens_m.min(self.path_of(region, seen_by_m, lens.far_m));
-        let scale_m = farthest_m.max(own_m).max(lens.far_m) * turn.max(1.0);
-        Verdict::Certain(Lasts { family: Family::Needed, scale_m, slack_m })
+        let stretch = self.stretch(region);
+        let margin = |part: usize| match &parts[part] {
+            Some((error_px, lens)) if *error_px > threshold_px => {
+                let reach_m = looks[part].error_m * self.pixels_per_radian / threshold_px;
+                let sight = self.sight(region, looks[part].seen_by_m);
+                self.above(lens, reach_m, stretch).and(sight)
+            }
+            _ => Margin { slack_m: f64::NEG_INFINITY, per_m: 1.0, per_radian_m: 0.0 },
+        };
+        let [own, kids, finer] = [0, 1, 2].map(margin);
+        self.lasts(Family::Needed, own.or(kids).or(finer))
     }
 }
 
-/// How the screen's plane enlarges errors of a region.
+/// How the screen's plane enlarges errors of ground in a ball.
 struct Lens {
-    /// What an error is divided by: at least the corner's squared cosine.
-    shrink: f64,
+    /// Nothing of the ground is nearer, metres.
+    distance_m: f64,
+    /// Nothing of it in the picture is less deep, metres: Z.
+    depth_m: f64,
     /// A: at most so much of a vertical error lies across the view direction.
     across: f64,
-    /// Nothing of the region is farther, metres.
+    /// F, metres.
+    seen_m: f64,
+    /// Nothing of it is farther, metres: D.
     far_m: f64,
+    /// Chord from the ball's normal to the farthest normal: ε.
+    cap: f64,
 }
 
-/// A is never taken for less, so that what depends on it changes slowly.
-const ACROSS_MIN: f64 = 0.25;
+/// A lens is never taken to shrink errors by more than this, so that what depends on it changes
+/// slowly.
+const SHRINK_MIN: f64 = 0.25;
 
-impl Lens {
-    /// a: how strongly the lens changes with the view.
-    fn strength(&self) -> f64 {
-        if self.across < 1.0 { 1.0 / self.across } else { 1.0 }
+/// By how much something is on one side of a border, and how fast it may lose that.
+#[derive(Clone, Copy)]
+struct Margin {
+    /// Not on that side below 0. Metres.
+    slack_m: f64,
+    /// What is lost for each metre that the eye moves.
+    per_m: f64,
+    /// What is lost for each radian of a turn, or for a change of the threshold by all of itself.
+    per_radian_m: f64,
+}
+
+impl Margin {
+    /// Less the rounding of lengths like this one.
+    fn rounded(self, length_m: f64) -> Self {
+        let rounding_m = 1e-9 * (length_m + self.per_radian_m) + 1e-6;
+        Self { slack_m: self.slack_m - rounding_m.copysign(self.slack_m), ..self }
     }
+
+    /// The same, and no longer than while what is this far away stays about as far.
+    fn within(self, far_m: f64) -> Self {
+        let most_m = 0.1 * far_m * self.per_m;
+        Self { slack_m: self.slack_m.clamp(-most_m, most_m), ..self }.rounded(far_m)
+    }
+
+    /// The other side of the same border.
+    fn turned(self) -> Self {
+        Self { slack_m: -self.slack_m, ..self }
+    }
+
+    /// How far the eye may move.
+    fn path_m(self) -> f64 {
+        self.slack_m / self.per_m
+    }
+
+    /// While both last.
+    fn and(self, other: Self) -> Self {
+        let path_m = least(self.path_m(), other.path_m());
+        let scale = |one: Self| one.per_radian_m / one.per_m;
+        Self { slack_m: path_m, per_m: 1.0, per_radian_m: greater(scale(self), scale(other)) }
+    }
+
+    /// While the one that is good for the longer way lasts.
+    fn or(self, other: Self) -> Self {
+        if other.path_m() > self.path_m() { other } else { self }
+    }
+}
+
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The most motion of any view between two frames; `None` where no verdict may last, as when
@@ -414,14 +514,33 @@ pub fn motion_between(before: &[Sight], now: &[Sight]) -> Option<Motion> {
     now.iter().zip(before).map(of).try_fold(Motion::default(), |most, one| Some(most.most(one?)))
 }
 
-/// Distances of a region and its error if it lay in the middle of the picture.
+/// Parts of a region: the diamond's own triangles, its kids', those of all finer descendants. Where
+/// a part may be contains where those before it may be.
+const PARTS: usize = 3;
+
+fn caps_of(region: &Region) -> [f64; PARTS] {
+    [region.own_cap, region.kids_cap, region.cap]
+}
+
+fn errors_of(region: &Region) -> [f64; PARTS] {
+    [region.error_m, region.kids_m, region.finer_m]
+}
+
+/// What a view sees of a part of a region.
+#[derive(Clone, Copy)]
 struct Look {
+    cap: f64,
+    error_m: f64,
+    /// Lower bound on the distance, at least the near distance.
     distance_m: f64,
-    /// To the diamond's own triangles, at least the near distance.
-    own_m: f64,
-    /// To all that descends from it, the same.
-    all_m: f64,
-    flat_px: f64,
+    /// The lesser margin before horizon and frustum, metres: negative where the part is hidden.
+    seen_by_m: f64,
+}
+
+/// The greatest error of what is seen.
+fn worst_px(parts: &[Option<(f64, Lens)>; PARTS]) -> f64 {
+    let errors_px = parts.iter().flatten().map(|part| part.0);
+    errors_px.fold(0.0, greater)
 }
 
 /// Priority of a region: the largest error over all views.

@@ -186,6 +186,7 @@ impl Synthetic {
             narrow(sagitta_m + residual_m).next_up()
         });
         let variation_m = narrow(self.relief.rise_m(place, reach)).next_up();
-        Bound { error_odd_m: odd_m, error_even_m: even_m, variation_m }
+        let error_finer_m = if self.patch_depth == 0 { odd_m } else { even_m };
+        Bound { error_odd_m: odd_m, error_even_m: even_m, error_finer_m, variation_m }
     }
 }
