@@ -27,7 +27,7 @@ use fly::{Flew, Plan};
 pub use options::Arguments;
 use overfly::config::{self, read_budget};
 use overfly::core::settings::SceneSettings;
-use overfly::replay::budget::judge::{budget_names, incomparable, known_names};
+use overfly::replay::budget::judge::{budget_names, incomparable, known_names, unshared};
 use overfly::replay::budget::record::{ERRORS, FRAME, INSTRUCTIONS, times};
 use overfly::replay::budget::{
     BudgetSettings, Outcome, PairRule, RunRecord, Statistic, Status, Verdict, init, judge, outcome,
@@ -238,6 +238,11 @@ fn judged(
         }
         if record.errors.frames != base.errors.frames {
             notes.push("The baseline has errors of other frames; they were not compared.".into());
+        }
+        let alone = unshared([record, base]);
+        if !alone.is_empty() {
+            let alone = alone.join(", ");
+            notes.push(format!("Not compared, since only run or baseline counts it: {alone}."));
         }
     }
     Ok(judge(record, &given.budget, given.baseline.as_ref()))

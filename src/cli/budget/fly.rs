@@ -183,7 +183,7 @@ fn note(plan: &Plan, flown: &Flown, frame: usize, flew: &mut Flew) {
 }
 
 /// In the order of [`MORE_COUNTERS`].
-fn more_counts(flown: &Flown) -> [f64; 3] {
+fn more_counts(flown: &Flown) -> [f64; MORE_COUNTERS.len()] {
     let FrameOutput { counts, views, .. } = &flown.output;
     let terrain = flown.overfly.terrain();
     let ranges = views.iter().flat_map(|view| &view.ranges);
@@ -192,7 +192,13 @@ fn more_counts(flown: &Flown) -> [f64; 3] {
     let morph_bytes = if morphs { size_of::<PatchMorph>() } else { 0 };
     let patch = f64::from(terrain.patches().vertices_per_patch);
     let bytes = patch * (size_of::<PatchVertex>() + morph_bytes) as f64;
-    [draws as f64, f64::from(counts.built) * bytes, flown.queue_depth() as f64]
+    [
+        draws as f64,
+        f64::from(counts.built) * bytes,
+        flown.queue_depth() as f64,
+        flown.decoded_bytes as f64,
+        flown.allocations as f64,
+    ]
 }
 
 /// Where the first eye of the last frame was.
