@@ -77,7 +77,7 @@ pub struct RunRecord {
 
 /// What was flown, by whom and on what. Where nothing was timed profile, platform, processor, cores
 /// and workers are empty or 0: counts do not depend on them, so the record is the same anywhere.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Facts {
     /// Name and version of the program.

@@ -5,6 +5,7 @@
 //! Keeps: nothing.
 //! Not here: what a record holds (`overfly::replay::budget`), errors (`errors`), verdicts.
 
+use super::trace;
 use crate::cli::Failure;
 use crate::cli::flown::{Flown, Manner};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,6 +22,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Places at most at which the ground beneath the eye is asked for.
 const GROUND_PLACES: usize = 400;
+
+/// So often those spans are thrown away that no trace will show.
+const SPANS_FRAMES: usize = 1 << 14;
 
 /// What is flown, and how often.
 pub struct Plan {
@@ -179,6 +183,9 @@ fn note(plan: &Plan, flown: &Flown, frame: usize, flew: &mut Flew) {
             begin_ns: span.begin_ns,
             end_ns: span.end_ns,
         }));
+        if frame % SPANS_FRAMES == SPANS_FRAMES - 1 {
+            trace::thin(flew);
+        }
     }
 }
 

@@ -12,6 +12,11 @@ use super::{html, junit, markdown, trace};
 use crate::cli::{Failure, write_whole};
 use overfly::replay::budget::record::times;
 use overfly::replay::budget::{Outcome, RunRecord, Verdict};
+use serde::Serialize;
+use serde_json::Serializer;
+use serde_json::ser::Formatter;
+use std::borrow::Cow;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// What reports are made of.
@@ -39,36 +44,65 @@ pub fn word(outcome: Outcome) -> &'static str {
     }
 }
 
-/// Writes all of them into a folder.
+/// Writes all of them into a folder, one after the other: those of long flights are large.
 pub fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = vec![
-        ("junit.xml", junit::text(report)),
-        ("summary.md", markdown::text(report)),
-        ("report.html", html::page(report)),
-    ];
-    if let Some(flew) = report.flew {
-        files.push(("run.json", record_text(&flew.record)?));
-        files.push(("frames.csv", frames_csv(&flew.record)?));
-        if !flew.spans.is_empty() {
-            files.push(("trace.json", trace::text(flew)));
-        }
-    }
-    if let Some(versus) = report.versus {
-        files.push(("comparison.json", versus.json()));
-    }
     let mut written = Vec::new();
-    for (name, text) in files {
+    let mut keep = |name: &str, text: String| -> Result<(), Failure> {
         let path = folder.join(name);
         write_whole(&path, text.as_bytes())?;
         written.push(path);
+        Ok(())
+    };
+    keep("junit.xml", junit::text(report))?;
+    keep("summary.md", markdown::text(report))?;
+    keep("report.html", html::page(report))?;
+    if let Some(flew) = report.flew {
+        keep("run.json", record_text(&flew.record)?)?;
+        keep("frames.csv", frames_csv(&flew.record)?)?;
+        if !flew.spans.is_empty() {
+            keep("trace.json", trace::text(flew))?;
+        }
+    }
+    if let Some(versus) = report.versus {
+        keep("comparison.json", versus.json())?;
     }
     Ok(written)
 }
 
 /// A record as JSON, a line a column, so that differences of two files can be read.
 pub fn record_text(record: &RunRecord) -> Result<String, Failure> {
-    // Within a text a quotation mark would have a backslash before it.
-    Ok(serde_json::to_string(record)?.replace("],\"", "],\n\"") + "\n")
+    let mut text = Vec::new();
+    record.serialize(&mut Serializer::with_formatter(&mut text, Lines::default()))?;
+    text.push(b'\n');
+    Ok(String::from_utf8(text)?)
+}
+
+/// Compact JSON, but for a new line after each array that a key follows.
+#[derive(Default)]
+struct Lines {
+    /// The last thing written ended an array.
+    ends_array: bool,
+}
+
+impl Formatter for Lines {
+    fn end_array<W: Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.ends_array = true;
+        to.write_all(b"]")
+    }
+
+    fn end_object<W: Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.ends_array = false;
+        to.write_all(b"}")
+    }
+
+    fn begin_object_key<W: Write + ?Sized>(&mut self, to: &mut W, first: bool) -> io::Result<()> {
+        let ends_array = std::mem::take(&mut self.ends_array);
+        to.write_all(match (first, ends_array) {
+            (true, _) => b"",
+            (false, true) => b",\n",
+            (false, false) => b",",
+        })
+    }
 }
 
 /// One row a frame; times in milliseconds, a column for each run, named as in `frame_ms_1`.
@@ -76,15 +110,15 @@ fn frames_csv(record: &RunRecord) -> Result<String, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut heads: Vec<String> =
         ["frame", "time_s", "lat_deg", "lon_deg", "height_m"].map(str::to_owned).into();
-    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut columns: Vec<Cow<'_, [f64]>> = Vec::new();
     for (name, column) in &record.counters {
         heads.push(name.clone());
-        columns.push(column.clone());
+        columns.push(Cow::from(column));
     }
     for name in times() {
         for (run, column) in record.times_ms(name).into_iter().enumerate() {
             heads.push(format!("{name}_ms_{}", run + 1));
-            columns.push(column);
+            columns.push(Cow::from(column));
         }
     }
     writer.write_record(&heads)?;
