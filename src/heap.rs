@@ -92,8 +92,14 @@ mod tests {
         for workers in [0, 1, 2, 4] {
             let workers = Workers::new(workers).unwrap();
             let mut graph = Graph::<()>::new();
-            let boxed = |_: &(), chunk: usize, _: &mut _| drop(black_box(Box::new(chunk)));
-            graph.each(Span("boxes"), &[], |()| 64, boxed);
+            graph.each(
+                Span("boxes"),
+                &[],
+                |()| 64,
+                |(), chunk, _| {
+                    drop(black_box(Box::new(chunk)));
+                },
+            );
             graph.run(&(), &workers).unwrap();
             for _ in 0..100 {
                 assert_eq!(counted(|| graph.run(&(), &workers).unwrap()).1, 64, "a box a chunk");
