@@ -80,14 +80,22 @@ mod tests {
     use std::hint::black_box;
     use std::sync::Barrier;
 
-    /// One test: what it counts is the program's.
+    /// The least of many counts: other tests of this program may have workers of their own.
+    fn least(mut frame: impl FnMut()) -> u64 {
+        (0..100).map(|_| counted(&mut frame).1).min().expect("a hundred")
+    }
+
     #[test]
     fn calls_of_caller_and_workers_count_and_those_of_others_do_not() {
-        assert_eq!(counted(|| 7), (7, 0));
-        let (mut grown, calls) = counted(|| vec![0_u8; 10]);
-        assert_eq!(calls, 1, "zeroed memory is memory");
-        assert_eq!(counted(|| grown.reserve_exact(1000)).1, 1, "more memory is a call");
-        assert_eq!(counted(|| drop(black_box(grown))).1, 0, "giving back is none");
+        assert_eq!(counted(|| 7).0, 7);
+        assert_eq!(least(|| ()), 0);
+        assert_eq!(least(|| drop(black_box(vec![0_u8; 10]))), 1, "giving back is none");
+        let grown = || {
+            let mut bytes = Vec::<u8>::with_capacity(10);
+            bytes.reserve_exact(1000);
+            drop(black_box(bytes));
+        };
+        assert_eq!(least(grown), 2, "more memory is a call");
 
         for workers in [0, 1, 2, 4] {
             let workers = Workers::new(workers).unwrap();
@@ -100,20 +108,22 @@ mod tests {
                     drop(black_box(Box::new(chunk)));
                 },
             );
-            graph.run(&(), &workers).unwrap();
-            for _ in 0..100 {
-                assert_eq!(counted(|| graph.run(&(), &workers).unwrap()).1, 64, "a box a chunk");
-            }
+            assert_eq!(least(|| graph.run(&(), &workers).unwrap()), 64, "a box a chunk");
         }
 
         let (meet, part) = (Barrier::new(2), Barrier::new(2));
         let calls = std::thread::scope(|threads| {
             threads.spawn(|| {
-                meet.wait();
-                drop(black_box(vec![1_u8; 4096]));
-                part.wait();
+                for _ in 0..100 {
+                    meet.wait();
+                    drop(black_box(vec![1_u8; 4096]));
+                    part.wait();
+                }
             });
-            counted(|| (meet.wait(), part.wait())).1
+            least(|| {
+                meet.wait();
+                part.wait();
+            })
         });
         assert_eq!(calls, 0, "another thread's");
     }
