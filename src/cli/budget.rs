@@ -22,7 +22,7 @@ use super::flown::Manner;
 use super::replay::default_workers;
 use super::source::recording_header;
 use super::trade::stop_on_ctrl_c;
-use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, read_by, write_whole};
+use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, read_by, write_by, write_whole};
 use fly::{Flew, Plan};
 pub use options::Arguments;
 use overfly::config::{self, read_budget};
@@ -367,7 +367,7 @@ fn written(
     stopped: bool,
 ) -> Result<(), Failure> {
     if let (Some(path), Some(flew)) = (&given.record, report.flew) {
-        write_whole(path, reports::record_text(&flew.record)?.as_bytes())?;
+        write_by(path, |file| reports::write_record(&flew.record, file))?;
         say!("wrote {}", path.display());
     }
     if let (Some(path), Some(flew), false) = (&given.init, report.flew, stopped) {

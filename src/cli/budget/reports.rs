@@ -9,7 +9,7 @@ use super::fly::Flew;
 use super::stills::Still;
 use super::versus::Versus;
 use super::{html, junit, markdown, trace};
-use crate::cli::{Failure, write_whole};
+use crate::cli::{Failure, write_by, write_whole};
 use overfly::replay::budget::record::times;
 use overfly::replay::budget::{Outcome, RunRecord, Verdict};
 use serde::Serialize;
@@ -47,34 +47,30 @@ pub fn word(outcome: Outcome) -> &'static str {
 /// Writes all of them into a folder, one after the other: those of long flights are large.
 pub fn write(folder: &Path, report: &Report) -> Result<Vec<PathBuf>, Failure> {
     let mut written = Vec::new();
-    let mut keep = |name: &str, text: String| -> Result<(), Failure> {
-        let path = folder.join(name);
-        write_whole(&path, text.as_bytes())?;
-        written.push(path);
-        Ok(())
+    let mut place = |name: &str| {
+        written.push(folder.join(name));
+        folder.join(name)
     };
-    keep("junit.xml", junit::text(report))?;
-    keep("summary.md", markdown::text(report))?;
-    keep("report.html", html::page(report))?;
+    write_whole(&place("junit.xml"), junit::text(report).as_bytes())?;
+    write_whole(&place("summary.md"), markdown::text(report).as_bytes())?;
+    write_whole(&place("report.html"), html::page(report).as_bytes())?;
     if let Some(flew) = report.flew {
-        keep("run.json", record_text(&flew.record)?)?;
-        keep("frames.csv", frames_csv(&flew.record)?)?;
+        write_by(&place("run.json"), |file| write_record(&flew.record, file))?;
+        write_by(&place("frames.csv"), |file| write_frames(&flew.record, file))?;
         if !flew.spans.is_empty() {
-            keep("trace.json", trace::text(flew))?;
+            write_whole(&place("trace.json"), trace::text(flew).as_bytes())?;
         }
     }
     if let Some(versus) = report.versus {
-        keep("comparison.json", versus.json())?;
+        write_whole(&place("comparison.json"), versus.json().as_bytes())?;
     }
     Ok(written)
 }
 
 /// A record as JSON, a line a column, so that differences of two files can be read.
-pub fn record_text(record: &RunRecord) -> Result<String, Failure> {
-    let mut text = Vec::new();
-    record.serialize(&mut Serializer::with_formatter(&mut text, Lines::default()))?;
-    text.push(b'\n');
-    Ok(String::from_utf8(text)?)
+pub fn write_record(record: &RunRecord, to: &mut impl Write) -> io::Result<()> {
+    record.serialize(&mut Serializer::with_formatter(&mut *to, Lines::default()))?;
+    to.write_all(b"\n")
 }
 
 /// Compact JSON, but for a new line after each array that a key follows.
@@ -106,8 +102,8 @@ impl Formatter for Lines {
 }
 
 /// One row a frame; times in milliseconds, a column for each run, named as in `frame_ms_1`.
-fn frames_csv(record: &RunRecord) -> Result<String, Failure> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+fn write_frames(record: &RunRecord, to: &mut impl Write) -> io::Result<()> {
+    let mut writer = csv::Writer::from_writer(to);
     let mut heads: Vec<String> =
         ["frame", "time_s", "lat_deg", "lon_deg", "height_m"].map(str::to_owned).into();
     let mut columns: Vec<Cow<'_, [f64]>> = Vec::new();
@@ -130,5 +126,5 @@ fn frames_csv(record: &RunRecord) -> Result<String, Failure> {
             .chain(columns.iter().map(|column| column[frame].to_string()));
         writer.write_record(row)?;
     }
-    Ok(String::from_utf8(writer.into_inner()?)?)
+    writer.flush()
 }
