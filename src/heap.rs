@@ -112,14 +112,13 @@ mod tests {
         }
 
         let (meet, part) = (Barrier::new(2), Barrier::new(2));
+        let others = || {
+            meet.wait();
+            drop(black_box(vec![1_u8; 4096]));
+            part.wait();
+        };
         let calls = std::thread::scope(|threads| {
-            threads.spawn(|| {
-                for _ in 0..100 {
-                    meet.wait();
-                    drop(black_box(vec![1_u8; 4096]));
-                    part.wait();
-                }
-            });
+            threads.spawn(|| (0..100).for_each(|_| others()));
             least(|| {
                 meet.wait();
                 part.wait();

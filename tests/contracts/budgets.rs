@@ -69,25 +69,25 @@ fn decoded_bytes_are_those_of_the_pages_that_arrived_and_steady_frames_allocate_
     let done = budget(&["--record", &file]);
     assert_eq!(done.code, 0, "{done:?}");
     let run = json(&file);
-    let column = |name: &str| -> Vec<u64> {
+    let column = |name: &str| -> Vec<f64> {
         let values = run["counters"][name].as_array().unwrap().iter();
-        values.map(|value| value.as_f64().unwrap().round() as u64).collect()
+        values.map(|value| value.as_f64().unwrap()).collect()
     };
     // A page without survey and imagery has 54200 bytes, and each that comes is taken or refused.
     let arrived = column("admitted").into_iter().zip(column("refused"));
-    let bytes: Vec<u64> = arrived.map(|(taken, not)| (taken + not) * 54_200).collect();
+    let bytes: Vec<f64> = arrived.map(|(taken, not)| (taken + not) * 54_200.0).collect();
     assert_eq!(column("decoded_bytes"), bytes);
-    let total: u64 = bytes.iter().sum();
-    assert!(total > 0, "no page came in these frames");
-    let budget_of = |limit: u64| {
+    let total: f64 = bytes.iter().sum();
+    assert!(total > 0.0, "no page came in these frames");
+    let budget_of = |limit: f64| {
         let line = format!("Budget(lines: [(of: decoded_bytes, statistic: sum, limit: {limit})])");
         std::fs::write(&lines, line).unwrap();
         budget(&["--budget", &lines])
     };
     assert_eq!(budget_of(total).code, 0);
-    let over = budget_of(total - 1);
+    let over = budget_of(total - 1.0);
     assert!(over.code == 1 && over.out.contains("decoded_bytes sum is"), "{over:?}");
-    assert_eq!(column("allocations"), [0; 400]);
+    assert_eq!(column("allocations"), [0.0; 400]);
 }
 
 #[test]
