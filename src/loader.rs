@@ -332,6 +332,7 @@ mod tests {
             assert_eq!(colour.key, page.key);
             assert!(colour.rgba.iter().all(|&texel| texel == RED));
             assert_ne!(page.content, plain.content);
+            assert_eq!(page.bytes(), plain.bytes() + 66_596);
             assert_eq!(page.heights_m, plain.heights_m);
         }
     }

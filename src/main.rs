@@ -4,10 +4,11 @@
 //! Out:   tables, files, an exit code: 0 good, 1 diverged, 2 bad input, 130 interrupted.
 //! Keeps: nothing.
 //! Not here: what the commands do (`cli`), the window (`viewer`).
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 #[macro_use]
 mod cli;
+mod heap;
 mod viewer;
 
 use clap::{Parser, Subcommand};

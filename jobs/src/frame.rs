@@ -14,6 +14,13 @@ thread_local! {
     static ENGAGEMENTS: Cell<u32> = const { Cell::new(0) };
 }
 
+/// Whether this thread takes part in a frame: it has one open, works in one, or is a worker of any
+/// [`Workers`], even one that sleeps. For who counts what frames do, as an allocator; it allocates
+/// nothing and can be asked anywhere.
+pub fn takes_part() -> bool {
+    Engaged::anywhere()
+}
+
 /// While one exists, this thread takes part in something and must not be lent: it would wait for
 /// itself.
 pub(crate) struct Engaged(PhantomData<*const ()>);

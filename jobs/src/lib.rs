@@ -124,7 +124,7 @@ mod workers;
 
 pub use arithmetic::{ArithmeticFault, check_arithmetic};
 pub use cancel::{Cancel, Stopped};
-pub use frame::Frame;
+pub use frame::{Frame, takes_part};
 pub use graph::{Graph, StageId};
 pub use pin::pin_this_thread;
 pub use run::StagePanic;

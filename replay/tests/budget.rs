@@ -7,7 +7,7 @@
 
 use overfly_config::read_budget;
 use overfly_core::digest::mix;
-use overfly_replay::budget::judge::{budget_names, incomparable, known_names};
+use overfly_replay::budget::judge::{budget_names, incomparable, known_names, unshared};
 use overfly_replay::budget::pairs::{compare, goes_on};
 use overfly_replay::budget::record::{DIGESTS, ERRORS, Facts, Sampled, counters, times};
 use overfly_replay::budget::{
@@ -165,6 +165,46 @@ fn a_baseline_is_held_to_the_last_digit_and_a_doubled_count_names_frame_and_plac
     assert_eq!(outcome(&judge(&run, &allowed, Some(&base))), Outcome::Pass);
     let alone = judge(&run, &allowed, None);
     assert!(alone.iter().all(|one| one.status == Status::Skipped));
+}
+
+#[test]
+fn an_older_baseline_is_held_for_what_it_has_and_what_it_lacks_is_named() {
+    let (run, mut base) = (record(1), record(1));
+    for newer in ["allocations", "decoded_bytes"] {
+        base.counters.remove(newer);
+    }
+    assert_eq!(unshared([&run, &base]), ["allocations", "decoded_bytes"]);
+    assert_eq!(unshared([&base, &run]), ["allocations", "decoded_bytes"]);
+    let verdicts = judge(&run, &BudgetSettings::default(), Some(&base));
+    let all = judge(&run, &BudgetSettings::default(), Some(&record(1)));
+    assert_eq!((verdicts.len() + 2, outcome(&verdicts)), (all.len(), Outcome::Pass));
+    assert!(verdicts.iter().all(|one| !unshared([&run, &base]).contains(&one.of)));
+    let asked = budget("(of: allocations, statistic: changed, limit: 0)");
+    let asked = &judge(&run, &asked, Some(&base))[0];
+    assert_eq!(asked.status, Status::Skipped);
+    assert_eq!(asked.sentence, "allocations changed: the baseline does not have it");
+    base.counters.get_mut("splits").unwrap()[4] += 1.0;
+    let verdicts = judge(&run, &BudgetSettings::default(), Some(&base));
+    assert_eq!(outcome(&verdicts), Outcome::Fail, "what it has is still held");
+    let text = diff(&base, &run).text(&run);
+    assert!(text.contains("differs: counted by one alone: allocations, decoded_bytes"), "{text}");
+}
+
+#[test]
+fn a_single_heap_call_in_a_single_frame_breaks_its_line_and_names_the_frame() {
+    let mut run = record(1);
+    run.counters.insert("allocations".into(), vec![0.0; FRAMES]);
+    let none = budget("(of: allocations, statistic: max, limit: 0)");
+    let calm = run.clone();
+    assert_eq!(outcome(&judge(&calm, &none, None)), Outcome::Pass);
+    run.counters.get_mut("allocations").unwrap()[77] = 1.0;
+    let verdicts = judge(&run, &none, Some(&calm));
+    assert_eq!(verdicts[0].status, Status::Fail);
+    assert!(verdicts[0].sentence.contains("worst in frame 1077"), "{:?}", verdicts[0]);
+    let changed: Vec<_> =
+        verdicts[1..].iter().filter(|one| one.status == Status::Fail).map(|one| &one.of).collect();
+    assert_eq!(changed, ["allocations"]);
+    assert_eq!(diff(&calm, &run).stage, "frame", "it is of no stage alone");
 }
 
 #[test]

@@ -22,12 +22,12 @@ use super::flown::Manner;
 use super::replay::default_workers;
 use super::source::recording_header;
 use super::trade::stop_on_ctrl_c;
-use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, read_by, write_whole};
+use super::{BAD_INPUT, Failure, INTERRUPTED, place_of, read_by, write_by, write_whole};
 use fly::{Flew, Plan};
 pub use options::Arguments;
 use overfly::config::{self, read_budget};
 use overfly::core::settings::SceneSettings;
-use overfly::replay::budget::judge::{budget_names, incomparable, known_names};
+use overfly::replay::budget::judge::{budget_names, incomparable, known_names, unshared};
 use overfly::replay::budget::record::{ERRORS, FRAME, INSTRUCTIONS, times};
 use overfly::replay::budget::{
     BudgetSettings, Outcome, PairRule, RunRecord, Statistic, Status, Verdict, init, judge, outcome,
@@ -239,6 +239,11 @@ fn judged(
         if record.errors.frames != base.errors.frames {
             notes.push("The baseline has errors of other frames; they were not compared.".into());
         }
+        let alone = unshared([record, base]);
+        if !alone.is_empty() {
+            let alone = alone.join(", ");
+            notes.push(format!("Not compared, since only run or baseline counts it: {alone}."));
+        }
     }
     Ok(judge(record, &given.budget, given.baseline.as_ref()))
 }
@@ -362,7 +367,7 @@ fn written(
     stopped: bool,
 ) -> Result<(), Failure> {
     if let (Some(path), Some(flew)) = (&given.record, report.flew) {
-        write_whole(path, reports::record_text(&flew.record)?.as_bytes())?;
+        write_by(path, |file| reports::write_record(&flew.record, file))?;
         say!("wrote {}", path.display());
     }
     if let (Some(path), Some(flew), false) = (&given.init, report.flew, stopped) {

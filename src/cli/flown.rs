@@ -7,6 +7,7 @@
 
 use super::Failure;
 use super::source::Source;
+use crate::heap::counted;
 use overfly::core::datasource::{Page, PageKey};
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::settings::SceneSettings;
@@ -34,7 +35,11 @@ pub struct Flown {
     pub output: FrameOutput,
     /// How long the last frame took, in nanoseconds; waiting for its pages is not part of it.
     pub frame_ns: u64,
-    /// The same of each frame of the last lead-in.
+    /// Heap calls of the last frame, by its caller and its workers.
+    pub allocations: u64,
+    /// Bytes of the pages that arrived in the last frame, as they came out of archives and generator.
+    pub decoded_bytes: usize,
+    /// How long each frame of the last lead-in took.
     pub lead_in_ns: Vec<u64>,
     scene: SceneSettings,
     input: FrameInput,
@@ -90,6 +95,8 @@ impl Flown {
             source,
             output: FrameOutput::default(),
             frame_ns: 0,
+            allocations: 0,
+            decoded_bytes: 0,
             lead_in_ns: Vec::new(),
             scene: scene.clone(),
             input: FrameInput::default(),
@@ -165,10 +172,13 @@ impl Flown {
         }
         let arriving = self.arriving();
         self.loader.fetch(&arriving, &mut self.input.arrived);
+        self.decoded_bytes = self.input.arrived.iter().map(|page| page.bytes()).sum();
+        let Self { overfly, input, output, .. } = self;
         let begin_ns = now_ns();
-        counted_frame(&mut self.overfly, &mut self.input, &mut self.output)?;
+        let (ran, allocations) = counted(|| counted_frame(overfly, input, output));
         self.frame_ns = now_ns() - begin_ns;
-        Ok(())
+        self.allocations = allocations;
+        Ok(ran?)
     }
 
     /// The pages of this frame: as recorded; else what was wanted and is due.

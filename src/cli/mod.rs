@@ -35,6 +35,8 @@ pub mod stills;
 pub mod trade;
 pub mod view;
 
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// A replay left the recorded states.
@@ -106,12 +108,24 @@ pub fn beside(path: &Path) -> PathBuf {
 
 /// Writes a file beside its place and renames it there, so that a kill leaves the old one or none.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    write_by(path, |file| file.write_all(bytes))
+}
+
+/// The same of a file too large to be in memory beforehand: `write` writes all of it.
+pub fn write_by(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Failure> {
     let failed = |error| format!("{}: {error}", path.display());
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(failed)?;
     }
     let beside = beside(path);
-    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path));
+    let whole = File::create(&beside).map(BufWriter::new).and_then(|mut file| {
+        write(&mut file)?;
+        file.flush()
+    });
+    let written = whole.and_then(|()| std::fs::rename(&beside, path));
     if written.is_err() {
         // What is half written helps nobody; that it cannot be removed changes nothing.
         let _ = std::fs::remove_file(&beside);

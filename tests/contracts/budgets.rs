@@ -36,15 +36,17 @@ fn json(file: &str) -> Value {
 #[test]
 fn the_same_program_counts_the_same_to_the_last_byte_whatever_its_workers() {
     let folder = tempfile::tempdir().unwrap();
-    let [a, b] = ["a.json", "b.json"].map(|name| path(folder.path(), name));
-    for (file, workers) in [(&a, "0"), (&b, "1")] {
+    let files = ["0", "1", "2", "4"].map(|workers| (path(folder.path(), workers), workers));
+    for (file, workers) in &files {
         let done =
             budget(&["--counters-only", "--errors", "2", "--workers", workers, "--record", file]);
         assert_eq!(done.code, 0, "{done:?}");
     }
-    let text = std::fs::read_to_string(&a).unwrap();
-    let other = std::fs::read_to_string(&b).unwrap();
-    assert!(text == other, "two runs differ");
+    let texts = files.each_ref().map(|(file, _)| std::fs::read_to_string(file).unwrap());
+    for (text, (_, workers)) in texts.iter().zip(&files) {
+        assert!(*text == texts[0], "the run with {workers} workers differs");
+    }
+    let [(a, _), (b, _), ..] = files;
     let run = json(&a);
     assert_eq!(run["format"], "overfly-budget-run-1");
     assert_eq!(run["counters"]["triangles"].as_array().unwrap().len(), 80);
@@ -56,6 +58,36 @@ fn the_same_program_counts_the_same_to_the_last_byte_whatever_its_workers() {
     let same = overfly(&["diff", &a, &b]);
     assert_eq!(same.code, 0, "{same:?}");
     assert!(same.out.contains("no count and no digest differs in 80 frames"), "{same:?}");
+}
+
+#[test]
+fn decoded_bytes_are_those_of_the_pages_that_arrived_and_steady_frames_allocate_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, lines) = (path(folder.path(), "run.json"), path(folder.path(), "budget.ron"));
+    let down = ["budget", "descent", "--scene", "small", "--frames", "0..400", "--errors", "0"];
+    let budget = |more: &[&str]| overfly(&[&down[..], &["--counters-only"], more].concat());
+    let done = budget(&["--record", &file]);
+    assert_eq!(done.code, 0, "{done:?}");
+    let run = json(&file);
+    let column = |name: &str| -> Vec<f64> {
+        let values = run["counters"][name].as_array().unwrap().iter();
+        values.map(|value| value.as_f64().unwrap()).collect()
+    };
+    // A page without survey and imagery has 54200 bytes, and each that comes is taken or refused.
+    let arrived = column("admitted").into_iter().zip(column("refused"));
+    let bytes: Vec<f64> = arrived.map(|(taken, not)| (taken + not) * 54_200.0).collect();
+    assert_eq!(column("decoded_bytes"), bytes);
+    let total: f64 = bytes.iter().sum();
+    assert!(total > 0.0, "no page came in these frames");
+    let budget_of = |limit: f64| {
+        let line = format!("Budget(lines: [(of: decoded_bytes, statistic: sum, limit: {limit})])");
+        std::fs::write(&lines, line).unwrap();
+        budget(&["--budget", &lines])
+    };
+    assert_eq!(budget_of(total).code, 0);
+    let over = budget_of(total - 1.0);
+    assert!(over.code == 1 && over.out.contains("decoded_bytes sum is"), "{over:?}");
+    assert_eq!(column("allocations"), [0.0; 400]);
 }
 
 #[test]

@@ -102,6 +102,14 @@ pub struct Page {
 }
 
 impl Page {
+    /// Bytes that it takes with its survey and its colour.
+    pub fn bytes(&self) -> usize {
+        let survey = if self.survey.is_some() { size_of::<Survey>() } else { 0 };
+        let colour =
+            self.colour.as_ref().map_or(0, |tile| size_of_val(&**tile) + size_of_val(&*tile.rgba));
+        size_of::<Self>() + survey + colour
+    }
+
     /// Index of the sample at a lattice point of this page.
     ///
     /// # Panics
@@ -153,11 +161,36 @@ impl Page {
 
 #[cfg(test)]
 mod tests {
+    use super::super::colour::COLOUR_TEXELS;
     use super::*;
 
     #[test]
     fn a_page_without_imagery_costs_what_it_did_before_there_was_any() {
         // So many bytes divide a scene's budget into pages, and flights' digests hang on how many.
         assert_eq!(size_of::<Page>(), 54_200);
+    }
+
+    #[test]
+    fn bytes_are_those_of_page_survey_and_colour() {
+        let key = PageKey::root(0);
+        let mut page = Page {
+            key,
+            heights_m: [0.0; SAMPLES],
+            normals: [[0; 2]; SAMPLES],
+            layers: [[0; 4]; SAMPLES],
+            bounds: [Bound::UNKNOWN; BOUND_SIDE * BOUND_SIDE],
+            survey: None,
+            colour: None,
+            content: 0,
+        };
+        assert_eq!(page.bytes(), 54_200);
+        let (sea_level_m, origin) = ([0.0; SAMPLES], [Origin::Measured; SAMPLES]);
+        page.survey = Some(Box::new(Survey { sea_level_m, sea_level_variation_m: 0.0, origin }));
+        // 65 × 65 samples of 4 bytes and 1, a number, padding.
+        assert_eq!(page.bytes(), 54_200 + 21_132);
+        let rgba = vec![[0; 4]; COLOUR_TEXELS].into();
+        page.colour = Some(Arc::new(ColourTile { key, rgba, content: 0 }));
+        // 129 × 129 texels of 4 bytes; key, address, length and content.
+        assert_eq!(page.bytes(), 54_200 + 21_132 + 66_564 + 32);
     }
 }

@@ -16,7 +16,7 @@ use crate::datasource::pages::{Admission, Pages};
 use crate::datasource::{Page, PageKey};
 use crate::digest::Chain;
 use crate::geodesy::narrow;
-use crate::limits::{DEEPEST, Limits, SettingsFault, check_surface};
+use crate::limits::{BASE_DIAMONDS, DEEPEST, Limits, SettingsFault, check_surface};
 use crate::lod::cover::{Cover, Planet, judge};
 use crate::lod::refine::{Knobs, Mesh, Refinement};
 use crate::lod::screen_error::{Horizon, Sight, motion_between};
@@ -389,6 +389,7 @@ fn refine_surface(terrain: &Terrain) {
     let Lod { mesh, cover, .. } = &mut *lod;
     let output = &mut *output;
     output.wanted.clear();
+    output.wanted.reserve(terrain.settings.lod.wanted_max.max(BASE_DIAMONDS) as usize);
     if terrain.input.lock().hold_lod {
         let patch_depth = terrain.settings.lod.patch_depth;
         count(&mut output.counts, mesh, &Refinement::default(), patch_depth);
@@ -453,6 +454,8 @@ fn build(terrain: &Terrain, team: &Team<'_>) {
     let mut blocks = terrain.build_blocks.lock();
     let mut output = terrain.output.lock();
     output.built.clear();
+    // Whoever keeps the output pays for its bound once, and not in a busy frame.
+    output.built.reserve(terrain.limits.built as usize);
     patches.drain_fresh(&mut output.built);
     let SceneSettings { body, sea, .. } = &terrain.settings;
     let Lod { mesh, cover, sights, .. } = &*lod;

@@ -6,14 +6,17 @@
 //! Not here: whether that may be (`judge`), whether a difference in speed is real (`pairs`).
 
 use super::change::Change;
-use super::judge::change;
-use super::record::{DIGESTS, RunRecord, counters, times};
+use super::judge::{change, unshared};
+use super::record::{DIGESTS, FRAME, RunRecord, counters, times};
 use crate::stats::Summary;
 use std::fmt::Write;
 
 /// Stages of a frame and the counters that each fills, in pipeline order.
-const WORK: [(&str, &[&str]); 4] = [
-    ("datasource.admit", &["pages", "admitted", "evicted", "refused", "queue_depth"]),
+const WORK: [(&str, &[&str]); 5] = [
+    (
+        "datasource.admit",
+        &["pages", "admitted", "evicted", "refused", "queue_depth", "decoded_bytes"],
+    ),
     (
         "lod.refine",
         &[
@@ -30,6 +33,8 @@ const WORK: [(&str, &[&str]); 4] = [
     ),
     ("mesh.build", &["built", "uploaded_bytes"]),
     ("mesh.place", &["drawn", "draws"]),
+    // Of all stages together.
+    (FRAME, &["allocations"]),
 ];
 
 /// What differs between two runs.
@@ -105,7 +110,9 @@ fn facts(a: &RunRecord, b: &RunRecord) -> Vec<String> {
         ]
     };
     let pairs = all(a).into_iter().zip(all(b)).filter(|((_, a), (_, b))| a != b);
-    pairs.map(|((name, a), (_, b))| format!("{name}: {a}, {b}")).collect()
+    let alone = unshared([a, b]);
+    let alone = (!alone.is_empty()).then(|| format!("counted by one alone: {}", alone.join(", ")));
+    pairs.map(|((name, a), (_, b))| format!("{name}: {a}, {b}")).chain(alone).collect()
 }
 
 fn speed(a: &RunRecord, b: &RunRecord) -> Vec<(&'static str, [f64; 2])> {

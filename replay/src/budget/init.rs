@@ -19,7 +19,7 @@ pub const TIMES_FACTOR: f64 = 2.0;
 const HITCH_FACTOR: f64 = 8.0;
 
 /// Counters that cost time or memory, and what is limited of them.
-const COUNTED: [(&str, &[&str]); 10] = [
+const COUNTED: [(&str, &[&str]); 12] = [
     ("triangles", &["p99", "max"]),
     ("drawn", &["p99", "max"]),
     ("draws", &["max"]),
@@ -28,7 +28,9 @@ const COUNTED: [(&str, &[&str]); 10] = [
     ("merges", &["sum", "max"]),
     ("pages", &["max"]),
     ("wanted", &["sum", "max"]),
+    ("decoded_bytes", &["sum", "max"]),
     ("uploaded_bytes", &["sum", "max"]),
+    ("allocations", &["sum", "max"]),
     ("error_px_bound", &["max"]),
 ];
 

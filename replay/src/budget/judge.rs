@@ -86,7 +86,7 @@ pub fn budget_names<'n>(names: &'n [Vec<&'static str>; 3]) -> BudgetNames<'n> {
 }
 
 /// Judges a record. A baseline's counters, errors and digests must all be the same to the last bit,
-/// but for those of which a line says how many frames may have `changed`.
+/// but for those of which a line says how many frames may have `changed`, and for [`unshared`] ones.
 pub fn judge(
     record: &RunRecord,
     budget: &BudgetSettings,
@@ -105,6 +105,7 @@ pub fn judge(
         let mut lines = budget.lines.iter();
         lines.any(|line| line.of == of && line.statistic == Statistic::Changed)
     };
+    let unshared = unshared([record, base]);
     let [counted, _, digests] = known_names();
     // Another compiler gives other instructions for the same work.
     let counted = counted.into_iter().filter(|of| *of != INSTRUCTIONS);
@@ -112,11 +113,20 @@ pub fn judge(
         let (statistic, severity) = (Statistic::Changed, Severity::Fail);
         let line = BudgetLine { of, statistic, over: None, limit: 0.0, severity };
         // Errors are sampled where that was asked for: what only one of both has, is not compared.
-        if !ERRORS.contains(&of) || record.errors.frames == base.errors.frames {
+        let is_shared = !ERRORS.contains(&of) || record.errors.frames == base.errors.frames;
+        if is_shared && !unshared.iter().any(|name| name == of) {
             verdicts.push(changed(record, &line, Some(base)));
         }
     }
     verdicts
+}
+
+/// Counters that only one of two records has: the other is of a program that did not yet, or no
+/// longer, count them.
+pub fn unshared(records: [&RunRecord; 2]) -> Vec<String> {
+    let [a, b] = records.map(|record| &record.counters);
+    let of_a = a.keys().filter(|name| !b.contains_key(*name));
+    of_a.chain(b.keys().filter(|name| !a.contains_key(*name))).cloned().collect()
 }
 
 /// All verdicts together.
@@ -260,6 +270,9 @@ fn sentence(
 /// A line of frames that may differ from the baseline's.
 fn changed(record: &RunRecord, line: &BudgetLine, baseline: Option<&RunRecord>) -> Verdict {
     let Some(base) = baseline else { return skipped(line, "there is no baseline") };
+    if unshared([record, base]).iter().any(|name| name == line.of) {
+        return skipped(line, "the baseline does not have it");
+    }
     let change = change(line.of, [base, record]);
     let missing = record.frames().abs_diff(base.frames());
     let frames = change.as_ref().map_or(0, |change| change.frames) + missing;

@@ -15,9 +15,11 @@ use std::fmt;
 pub const FORMAT: &str = "overfly-budget-run-1";
 /// Name of the whole frame among the times.
 pub const FRAME: &str = "frame";
-/// Counters beside those of [`FrameCounts`]: depth ranges drawn, bytes of new vertices, and pages
-/// on their way to the terrain.
-pub const MORE_COUNTERS: [&str; 3] = ["draws", "uploaded_bytes", "queue_depth"];
+/// Counters beside those of [`FrameCounts`]: depth ranges drawn, bytes of new vertices, pages on
+/// their way to the terrain, bytes of the pages that arrived, and heap calls of the threads that run
+/// the frame.
+pub const MORE_COUNTERS: [&str; 5] =
+    ["draws", "uploaded_bytes", "queue_depth", "decoded_bytes", "allocations"];
 /// Columns of the sampled frames: measured error, promised bound, the one over the other.
 pub const ERRORS: [&str; 4] = ["e1_max_px", "e1_rms_px", "bound_px", "e5"];
 /// Column of the frames whose instructions were counted.
@@ -75,7 +77,7 @@ pub struct RunRecord {
 
 /// What was flown, by whom and on what. Where nothing was timed profile, platform, processor, cores
 /// and workers are empty or 0: counts do not depend on them, so the record is the same anywhere.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Facts {
     /// Name and version of the program.

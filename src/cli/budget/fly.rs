@@ -5,6 +5,7 @@
 //! Keeps: nothing.
 //! Not here: what a record holds (`overfly::replay::budget`), errors (`errors`), verdicts.
 
+use super::trace;
 use crate::cli::Failure;
 use crate::cli::flown::{Flown, Manner};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,6 +22,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Places at most at which the ground beneath the eye is asked for.
 const GROUND_PLACES: usize = 400;
+
+/// So often those spans are thrown away that no trace will show.
+const SPANS_FRAMES: usize = 1 << 14;
 
 /// What is flown, and how often.
 pub struct Plan {
@@ -179,11 +183,14 @@ fn note(plan: &Plan, flown: &Flown, frame: usize, flew: &mut Flew) {
             begin_ns: span.begin_ns,
             end_ns: span.end_ns,
         }));
+        if frame % SPANS_FRAMES == SPANS_FRAMES - 1 {
+            trace::thin(flew);
+        }
     }
 }
 
 /// In the order of [`MORE_COUNTERS`].
-fn more_counts(flown: &Flown) -> [f64; 3] {
+fn more_counts(flown: &Flown) -> [f64; MORE_COUNTERS.len()] {
     let FrameOutput { counts, views, .. } = &flown.output;
     let terrain = flown.overfly.terrain();
     let ranges = views.iter().flat_map(|view| &view.ranges);
@@ -192,7 +199,13 @@ fn more_counts(flown: &Flown) -> [f64; 3] {
     let morph_bytes = if morphs { size_of::<PatchMorph>() } else { 0 };
     let patch = f64::from(terrain.patches().vertices_per_patch);
     let bytes = patch * (size_of::<PatchVertex>() + morph_bytes) as f64;
-    [draws as f64, f64::from(counts.built) * bytes, flown.queue_depth() as f64]
+    [
+        draws as f64,
+        f64::from(counts.built) * bytes,
+        flown.queue_depth() as f64,
+        flown.decoded_bytes as f64,
+        flown.allocations as f64,
+    ]
 }
 
 /// Where the first eye of the last frame was.

@@ -139,7 +139,8 @@ fn charts(out: &mut String, report: &Report, record: &RunRecord) {
         let ground: Vec<(u32, f64)> = frames.zip(heights.iter().copied()).collect();
         out.push_str(&profile(along, &ground, &record.height_m));
     }
-    let names = ["admitted", "evicted", "wanted", "blocked", "splits", "merges", "built"];
+    let names =
+        ["admitted", "evicted", "wanted", "blocked", "splits", "merges", "built", "allocations"];
     let rows: Vec<(&str, &[f64])> = names.map(|name| (name, column(record, name))).into();
     out.push_str(&events(along, &rows));
     out.push_str(&band("triangles", along, triangles, &[]));
@@ -208,7 +209,16 @@ fn worst_table(
     (worst, by): (&[usize], &[f64]),
     stages: &[(String, Vec<f64>)],
 ) {
-    let counted = ["triangles", "evaluations", "splits", "merges", "built", "admitted", "evicted"];
+    let counted = [
+        "triangles",
+        "evaluations",
+        "splits",
+        "merges",
+        "built",
+        "admitted",
+        "evicted",
+        "allocations",
+    ];
     let timed = !stages.is_empty();
     let what = if timed { "longest" } else { "with the most triangles" };
     put(

@@ -22,10 +22,22 @@ const COUNTED: [&str; 5] = ["triangles", "splits", "pages", "wanted", "queue_dep
 /// Whether each frame of the columns is in the trace.
 fn chosen(frame_ms: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..frame_ms.len()).collect();
-    order.sort_by(|&a, &b| frame_ms[b].total_cmp(&frame_ms[a]).then(a.cmp(&b)));
-    let longest = &order[..LONGEST.min(order.len())];
+    let longer_first = |&a: &usize, &b: &usize| frame_ms[b].total_cmp(&frame_ms[a]).then(a.cmp(&b));
+    if order.len() > LONGEST {
+        order.select_nth_unstable_by(LONGEST, longer_first);
+        order.truncate(LONGEST);
+    }
+    let longest = &order;
     let near = |frame: usize| longest.iter().any(|&long| long.abs_diff(frame) <= AROUND);
     (0..frame_ms.len()).map(|frame| frame < FIRST || near(frame)).collect()
+}
+
+/// Throws away spans that no trace of this run will show, whatever comes: those of frames that are
+/// not chosen so far and around which no longer one can still come.
+pub fn thin(flew: &mut Flew) {
+    let frame_ms = flew.record.times_ms(FRAME).pop().unwrap_or_default();
+    let (chosen, frames) = (chosen(&frame_ms), frame_ms.len());
+    flew.spans.retain(|span| span.frame + AROUND >= frames || chosen[span.frame]);
 }
 
 /// Microseconds, as traces count.
@@ -94,7 +106,32 @@ fn name(what: &str, tid: u32, words: &str) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fly::Traced;
     use super::*;
+    use overfly::replay::budget::{Facts, RunRecord};
+
+    #[test]
+    fn thinning_on_the_way_leaves_the_spans_of_all_frames_that_are_chosen_in_the_end() {
+        // Each seventh frame is longer than those before it, so that the longest change all the time.
+        let ns = |frame: u64| 1_000_000 + frame * (frame % 7) * 100;
+        let mut record = RunRecord::new(Facts::default());
+        record.times_ns.push(BTreeMap::from([(FRAME.to_owned(), Vec::new())]));
+        let mut flew = Flew { record, spans: Vec::new() };
+        for frame in 0..1000 {
+            let begin_ns = frame as u64 * 10_000_000;
+            let span = Traced { frame, name: "camera", worker: 0, begin_ns, end_ns: begin_ns + 1 };
+            flew.record.times_ns[0].get_mut(FRAME).unwrap().push(ns(frame as u64));
+            flew.spans.push(span);
+            if frame % 13 == 0 {
+                thin(&mut flew);
+            }
+        }
+        let frame_ms = flew.record.times_ms(FRAME).pop().unwrap();
+        let kept: Vec<usize> = flew.spans.iter().map(|span| span.frame).collect();
+        let chosen = chosen(&frame_ms);
+        assert!((0..1000).filter(|&frame| chosen[frame]).all(|frame| kept.contains(&frame)));
+        assert!(kept.len() < 250, "{} frames of 1000 are kept", kept.len());
+    }
 
     #[test]
     fn the_first_and_the_longest_frames_are_chosen() {
