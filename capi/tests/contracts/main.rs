@@ -7,6 +7,7 @@
 
 mod calls;
 mod columns;
+mod drawing;
 mod examples;
 mod flights;
 mod handles;
@@ -14,3 +15,4 @@ mod header;
 mod hosts;
 mod junk;
 mod queries;
+mod renderers;
