@@ -8,7 +8,7 @@
  * Pointers. Each is null or good until the call returns, for as many elements as the function says,
  * aligned for its type, and nobody else writes there meanwhile. Texts are UTF-8 with a NUL at their
  * end. Null is answered with OVF_NULL_POINTER where it may not be. Nothing of the host's is kept
- * but the functions and `user` of ovf_host.
+ * but the functions and `user` of ovf_host, and what ovf_device and ovf_target name of Vulkan.
  *
  * Structs that begin with struct_size want sizeof there, also where they are only written: later
  * versions append fields, and take the shorter structs of older programs. Set all of a struct to 0

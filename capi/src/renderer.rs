@@ -209,6 +209,7 @@ pub unsafe extern "C" fn ovf_renderer_new_v1(
             let of_scene = RendererSettings::of(scene, terrain.limits(), [1, 1]);
             let settings = RendererSettings { frames_in_flight, ..of_scene };
             let news = Arc::new(News::new(settings.patches_max, terrain.tiles()));
+            state.news.retain(|news| news.strong_count() > 0);
             state.news.push(Arc::downgrade(&news));
             Ok((settings, news))
         })?;

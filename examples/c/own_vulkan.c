@@ -16,7 +16,6 @@
 #include <string.h>
 #include <vulkan/vulkan.h>
 
-#define EYE_HEIGHT_M 3000.0
 enum { WIDTH = 960, HEIGHT = 540, IN_FLIGHT = 2, FRAMES_MAX = 4000, FRAMES_AFTER = 8 };
 
 static const char LAYER[] = "VK_LAYER_KHRONOS_validation";
@@ -131,7 +130,7 @@ static void submit(Host *host) {
     host->next = (host->next + 1) % IN_FLIGHT;
 }
 
-/* One frame of the terrain, 900 m above the hills. */
+/* One frame of the terrain, 3000 m above the ellipsoid, a little further east with each step. */
 static ovf_frame fly(ovf_terrain terrain, int step, double time_s) {
     const double degree = 3.14159265358979323846 / 180.0;
     ovf_view view = {.struct_size = sizeof view,
@@ -141,7 +140,7 @@ static ovf_frame fly(ovf_terrain terrain, int step, double time_s) {
                      .height_px = HEIGHT,
                      .eye_lat_rad = 46.85 * degree,
                      .eye_lon_rad = (-121.76 + 1e-4 * step) * degree,
-                     .eye_height_m = EYE_HEIGHT_M,
+                     .eye_height_m = 3000.0,
                      .yaw_rad = 40.0 * degree,
                      .pitch_rad = -8.0 * degree,
                      .field_of_view_rad = 60.0 * degree,

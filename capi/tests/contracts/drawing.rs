@@ -2,164 +2,38 @@
 //!
 //! In:    the host of the root's examples, the example in C; a Vulkan device and the Khronos layer.
 //! Out:   test results; skipped by name without a device, unless `OVERFLY_REQUIRE_GPU` is 1.
-//! Keeps: nothing.
+//! Keeps: pictures and archives of imagery in folders, thrown away.
 //! Not here: what is refused, and handles (`renderers`).
-
-/// What is around overfly's draws in the root's examples.
-#[path = "../../../examples/host_vulkan"]
-#[expect(dead_code, reason = "the examples use the rest")]
-pub mod host_vulkan {
-    pub mod canvas;
-    pub mod frames;
-    pub mod host;
-
-    /// What most of it returns.
-    pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-}
 
 use super::calls::*;
 use super::examples::{built_with, out_of};
-use host_vulkan::canvas::{Canvas, IN_FLIGHT};
-use host_vulkan::frames::{Pane, draw};
-use host_vulkan::host::Host;
+use super::lent::host_vulkan::canvas::{Canvas, IN_FLIGHT};
+use super::lent::host_vulkan::frames::{Pane, draw};
+use super::lent::host_vulkan::host::Host;
+use super::lent::*;
 use overfly::core::camera::{View, orientation_from_attitude};
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::core::geodesy::Geodetic;
 use overfly::core::settings::SceneSettings;
 use overfly::core::units::Radians;
-use overfly::render_vk::ash::{self, vk};
-use overfly::render_vk::{HostRenderer, RendererSettings, Show, devices};
+use overfly::ingest::{ImageryOptions, build_imagery};
+use overfly::render_vk::{Backdrop, HostRenderer, RendererSettings, Show};
 use overfly::{Overfly, Pages, config};
 use overfly_c::drawing::*;
 use overfly_c::renderer::*;
 use overfly_c::scene::*;
 use overfly_c::terrain::*;
+use std::path::Path;
 use std::process::Command;
+use std::ptr::null_mut;
 use std::rc::Rc;
-use vk::Handle;
-
-/// What [`look`] looks at.
-pub const SIZE_PX: [u32; 2] = [640, 360];
-
-/// Whether to go on. Without a device not; and the layer reads its environment when it is loaded,
-/// so the test runs in a process of its own.
-pub fn go_on(module: &str, test: &str) -> bool {
-    const CHECKS: &str = "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT";
-    let found = devices().is_ok_and(|devices| !devices.is_empty());
-    let required = std::env::var("OVERFLY_REQUIRE_GPU").is_ok_and(|value| value == "1");
-    assert!(found || !required, "OVERFLY_REQUIRE_GPU=1 and no Vulkan device");
-    if !found {
-        println!("{test} skipped: no Vulkan device");
-        return false;
-    }
-    if std::env::var_os("VK_LAYER_ENABLES").is_some() {
-        return true;
-    }
-    let mut child = Command::new(std::env::current_exe().unwrap());
-    let child = child.args(["--exact", &format!("{module}::{test}"), "--nocapture"]);
-    assert!(child.env("VK_LAYER_ENABLES", CHECKS).status().unwrap().success());
-    false
-}
-
-/// Ends the host and asserts that the layer had nothing to say, objects that are left included.
-pub fn end(host: Rc<Host>) {
-    let (messages, validates) = (host.messages(), host.validates);
-    assert_eq!(Rc::strong_count(&host), 1, "something of the host is still in use");
-    drop(host);
-    let messages = messages.lock().unwrap();
-    assert!(messages.is_empty(), "{}", messages.join("\n"));
-    if !validates {
-        println!("messages unchecked: no validation layer");
-    }
-}
-
-/// What C says of a host's device.
-pub fn lent(host: &Host) -> ovf_device {
-    // SAFETY: loading runs the Vulkan loader's initialisers, which are sound. The host has it too, so
-    // it stays when this goes.
-    let entry = unsafe { ash::Entry::load() }.unwrap();
-    let find = entry.static_fn().get_instance_proc_addr;
-    // SAFETY: a pointer to a function, which is cast back before it is called.
-    let find = unsafe { std::mem::transmute::<vk::PFN_vkGetInstanceProcAddr, AnyFunction>(find) };
-    let pointer = |raw: u64| usize::try_from(raw).unwrap() as *mut _;
-    ovf_device {
-        queue_family: host.family,
-        api_version: vk::API_VERSION_1_1,
-        debug_utils: u32::from(host.validates),
-        multi_draw_indirect: 1,
-        get_instance_proc_addr: Some(find),
-        instance: pointer(host.instance.handle().as_raw()),
-        physical_device: pointer(host.physical.as_raw()),
-        device: pointer(host.device.handle().as_raw()),
-        queue: pointer(host.queue.as_raw()),
-        ..sized()
-    }
-}
-
-/// Any function, as C names it.
-pub type AnyFunction = unsafe extern "C" fn();
-
-/// What C says of a canvas.
-pub fn target(canvas: &Canvas) -> ovf_target {
-    let target = canvas.target();
-    let number = |format: vk::Format| u32::try_from(format.as_raw()).unwrap();
-    ovf_target {
-        subpass: target.subpass,
-        render_pass: target.render_pass.as_raw(),
-        colour_format: number(target.colour_format),
-        depth_format: number(target.depth_format),
-        samples: target.samples.as_raw(),
-        ..sized()
-    }
-}
-
-/// A renderer of a terrain for a canvas.
-pub fn renderer_of(terrain: ovf_terrain, canvas: &Canvas) -> ovf_renderer {
-    let (device, target) = (lent(&canvas.host), target(canvas));
-    let settings = ovf_renderer_settings { frames_in_flight: IN_FLIGHT, ..sized() };
-    let mut renderer = ovf_renderer { bits: 0 };
-    // SAFETY: the handles are good; each test waits until the device is idle before it destroys the
-    // renderer, and that before canvas and host.
-    must(unsafe { ovf_renderer_new_v1(terrain, &settings, &device, &target, &raw mut renderer) });
-    renderer
-}
-
-/// One of the canvas's frames, as C names it.
-pub fn frame_of((buffer, index): (vk::CommandBuffer, u32)) -> ovf_host_frame {
-    let command_buffer = usize::try_from(buffer.as_raw()).unwrap() as *mut _;
-    ovf_host_frame { index, command_buffer, ..sized() }
-}
-
-/// Records a picture as C does, and submits it.
-pub fn draw_in_c(
-    canvas: &mut Canvas,
-    renderer: ovf_renderer,
-    picture: ovf_picture,
-) -> ovf_draw_report {
-    let (buffer, index) = canvas.begin().unwrap();
-    let frame = frame_of((buffer, index));
-    let mut report = sized::<ovf_draw_report>();
-    // SAFETY: all pointers are of values that outlive the calls; the buffer is being recorded,
-    // outside the pass, then in it; `begin` has waited for the frame that had this index.
-    unsafe {
-        must(ovf_renderer_record_uploads(renderer, &frame, &picture, &raw mut report));
-        canvas.begin_pass(buffer);
-        for range in (0..report.ranges).rev() {
-            canvas.clear_depth(buffer);
-            must(ovf_renderer_record_range(renderer, &frame, range, 0, 0));
-        }
-        canvas.host.device.cmd_end_render_pass(buffer);
-    }
-    canvas.submit().unwrap();
-    report
-}
+use std::sync::atomic::AtomicBool;
 
 /// The façade with a renderer on the host's device, beside which C's is held.
 struct Facade {
     overfly: Overfly,
     output: FrameOutput,
     canvas: Canvas,
-    // Before the canvas's host, when all is dropped: see `close`.
     renderer: HostRenderer,
 }
 
@@ -174,22 +48,25 @@ impl Facade {
         let canvas = Canvas::new(host, size_px, &settings).unwrap();
         // SAFETY: the handles are good; `close` waits until the device is idle.
         let made = unsafe { HostRenderer::new(&settings, &host.lend(), &canvas.target()) };
-        Self { overfly, output: FrameOutput::default(), canvas, renderer: made.unwrap() }
+        let mut renderer = made.unwrap();
+        renderer.note_tiles(&overfly.terrain().tiles());
+        Self { overfly, output: FrameOutput::default(), canvas, renderer }
     }
 
-    fn fly(&mut self, time_s: f64, view: View, scene: Option<SceneSettings>) {
+    fn fly(&mut self, time_s: f64, views: Vec<View>, scene: Option<SceneSettings>) {
         let scene = scene.map(Box::new);
-        let mut input = FrameInput { time_s, views: vec![view], scene, ..FrameInput::default() };
+        let mut input = FrameInput { time_s, views, scene, ..FrameInput::default() };
         self.overfly.frame(&mut input, &mut self.output).unwrap();
         self.renderer.note_built(&self.output.built);
         self.renderer.note_tiles(&self.output.tiles);
     }
 
-    fn draw(&mut self, show: Show) -> Vec<u8> {
+    /// A view of the last frame, its corner at `at_px` of the canvas.
+    fn draw(&mut self, (view, at_px): (usize, [i32; 2]), show: Show) -> Vec<u8> {
         self.overfly.looks_mut().show = show;
         let Self { overfly, output, canvas, renderer } = self;
-        let drawn = overfly.with_picture(output, 0, |picture| {
-            draw(canvas, &mut [Pane { renderer, picture, at_px: [0, 0] }], |_, _| {})
+        let drawn = overfly.with_picture(output, view, |picture| {
+            draw(canvas, &mut [Pane { renderer, picture, at_px }], |_, _| {})
         });
         drawn.unwrap().unwrap();
         self.canvas.read_pixels().unwrap()
@@ -201,9 +78,74 @@ impl Facade {
     }
 }
 
-fn edited(terrain: ovf_terrain, frame: usize, sea: u32) {
-    let edit = ovf_edit { changes: OVF_EDIT_SEA, sea, ..sized() };
-    fly(terrain, frame, Some(&edit));
+/// The same terrain twice, each with a renderer and a canvas on one device.
+struct Both {
+    facade: Facade,
+    terrain: ovf_terrain,
+    renderer: ovf_renderer,
+    canvas: Canvas,
+    scene: SceneSettings,
+}
+
+impl Both {
+    fn new(scene: SceneSettings) -> Self {
+        let host = Rc::new(Host::new().unwrap());
+        let facade = Facade::new(&host, &scene, SIZE_PX);
+        let canvas = Canvas::new(&host, SIZE_PX, facade.renderer.settings()).unwrap();
+        let text = config::write(&scene).unwrap();
+        let terrain = open_text(&text, Some(&waiting())).unwrap();
+        Self { facade, terrain, renderer: renderer_of(terrain, &canvas), canvas, scene }
+    }
+
+    /// Flies a frame of [`dive`]; with a sea or without from here on.
+    fn fly(&mut self, frame: usize, sea: Option<bool>) {
+        let changed = sea.map(|sea| SceneSettings { sea, ..self.scene.clone() });
+        let view = dive_in_rust(frame, &self.scene);
+        self.facade.fly(frame as f64 / 60.0, vec![view], changed);
+        let edit = sea.map(|sea| ovf_edit { changes: OVF_EDIT_SEA, sea: sea.into(), ..sized() });
+        fly_views(self.terrain, frame, &[dive(frame)], edit.as_ref());
+    }
+
+    /// Draws the last frame with both and holds one picture against the other.
+    fn draws_the_same(&mut self, frame: usize) -> ovf_draw_report {
+        let (show, number) = match frame % 3 {
+            0 => (Show::Shaded, OVF_SHOW_SHADED),
+            1 => (Show::Level, OVF_SHOW_LEVEL),
+            _ => (Show::Normals, OVF_SHOW_NORMALS),
+        };
+        let expected = self.facade.draw((0, [0, 0]), show);
+        let picture = ovf_picture { show: number, ..sized() };
+        let report = draw_in_c(&mut self.canvas, self.renderer, picture);
+        let found = self.canvas.read_pixels().unwrap();
+        assert!(expected == found, "frame {frame}, {show:?}");
+        assert!(found.chunks_exact(4).any(|pixel| pixel != &found[..4]), "one colour");
+        assert!(report.draws > 0 && report.commands > 0 && report.triangles > 0);
+        assert_eq!(report.ranges, 3);
+        report
+    }
+
+    /// The same without a sky, where what the host cleared to shows beside the ground.
+    fn leaves_the_host_s_backdrop(&mut self) {
+        self.facade.overfly.looks_mut().backdrop = Backdrop::Colour([0.0; 3]);
+        let expected = self.facade.draw((0, [0, 0]), Show::Shaded);
+        let picture = ovf_picture { backdrop: OVF_BACKDROP_HOST, ..sized() };
+        draw_in_c(&mut self.canvas, self.renderer, picture);
+        let found = self.canvas.read_pixels().unwrap();
+        assert!(expected == found);
+        let (all, ground) = (found.len() / 4, found.chunks_exact(4).filter(|p| *p != [0; 4]));
+        let ground = ground.count();
+        println!("{ground} of {all} pixels are ground");
+        assert!(ground > all / 2 && ground < all, "{ground} of {all} pixels");
+    }
+
+    fn close(self) {
+        let host = Rc::clone(&self.canvas.host);
+        self.facade.close();
+        must(ovf_renderer_destroy(self.renderer));
+        must(ovf_terrain_destroy(self.terrain));
+        drop(self.canvas);
+        end(host);
+    }
 }
 
 #[test]
@@ -211,42 +153,116 @@ fn a_host_in_c_draws_the_facade_s_picture_to_the_last_byte() {
     if !go_on("drawing", "a_host_in_c_draws_the_facade_s_picture_to_the_last_byte") {
         return;
     }
-    let host = Rc::new(Host::new().unwrap());
-    let scene = config::load("small").unwrap();
-    let mut facade = Facade::new(&host, &scene, SIZE_PX);
-    let mut canvas = Canvas::new(&host, SIZE_PX, facade.renderer.settings()).unwrap();
-    let terrain = open_small(Some(&waiting()));
-    let renderer = renderer_of(terrain, &canvas);
+    let mut both = Both::new(config::load("small").unwrap());
     let mut uploaded = Vec::new();
     for frame in 0..60 {
         // At 40 the sea goes, so that the terrain begins anew under its renderers.
-        let changed = (frame == 40).then(|| SceneSettings { sea: false, ..scene.clone() });
-        facade.fly(frame as f64 / 60.0, look_in_rust(frame, &scene), changed);
-        match frame {
-            40 => edited(terrain, frame, 0),
-            _ => drop(fly(terrain, frame, None)),
-        }
+        both.fly(frame, (frame == 40).then_some(false));
         // The façade's renderer is told of every frame; C's finds out when it records.
-        if frame < 20 || frame % 4 != 3 {
-            continue;
+        if frame >= 20 && frame % 4 == 3 {
+            uploaded.push(both.draws_the_same(frame).uploaded_patches);
         }
-        let (show, number) = match frame % 3 {
-            0 => (Show::Shaded, OVF_SHOW_SHADED),
-            1 => (Show::Level, OVF_SHOW_LEVEL),
-            _ => (Show::Normals, OVF_SHOW_NORMALS),
-        };
-        let expected = facade.draw(show);
-        let report = draw_in_c(&mut canvas, renderer, ovf_picture { show: number, ..sized() });
-        let found = canvas.read_pixels().unwrap();
-        assert!(expected == found, "frame {frame}, {show:?}");
-        assert!(found.chunks_exact(4).any(|pixel| pixel != &found[..4]), "one colour");
-        assert_eq!(report.ranges, 3);
-        assert!(report.draws > 0 && report.commands > 0 && report.triangles > 0);
-        uploaded.push(report.uploaded_patches);
     }
     let (first, later) = uploaded.split_first().unwrap();
     println!("patches uploaded: {first}, then {later:?}");
+    both.leaves_the_host_s_backdrop();
     assert!(later[..4].iter().all(|count| count < first), "only what is new is copied");
+    both.close();
+}
+
+/// A scene with a picture over all of the ground.
+fn draped(folder: &Path) -> SceneSettings {
+    let mut scene = config::load("small").unwrap();
+    let [input, output] = ["over.png", "over.pmtiles"].map(|name| folder.join(name));
+    let chequers = |x: u32, y: u32| match (x / 4 + y / 4) % 2 {
+        0 => image::Rgba([250, 10, 10, 255]),
+        _ => image::Rgba([10, 10, 250, 255]),
+    };
+    image::RgbaImage::from_fn(512, 256, chequers).save(&input).unwrap();
+    scene.imagery.push(output.display().to_string());
+    let options = ImageryOptions {
+        input,
+        projection: None,
+        bounds_deg: None,
+        attribution: String::new(),
+        output,
+        body: ("small".into(), scene.body),
+    };
+    build_imagery(&options, &AtomicBool::new(false), &|_| {}).unwrap();
+    scene
+}
+
+#[test]
+fn imagery_reaches_renderers_that_are_early_late_or_have_lost_a_buffer() {
+    if !go_on("drawing", "imagery_reaches_renderers_that_are_early_late_or_have_lost_a_buffer") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut both = Both::new(draped(folder.path()));
+    (0..30).for_each(|frame| both.fly(frame, None));
+    both.draws_the_same(30);
+    let found = both.canvas.read_pixels().unwrap();
+    let red = |pixel: &&[u8]| pixel[0] > 90 && pixel[2] < 60;
+    let reds = found.chunks_exact(4).filter(red).count();
+    assert!(reds > 10_000, "{reds} pixels of the picture's red");
+    must(ovf_renderer_note_lost(both.renderer));
+    (31..40).for_each(|frame| both.fly(frame, None));
+    let lost = both.draws_the_same(42);
+    must(ovf_renderer_destroy(both.renderer));
+    both.renderer = renderer_of(both.terrain, &both.canvas);
+    let late = both.draws_the_same(42);
+    assert_eq!(late.uploaded_patches, lost.uploaded_patches, "both have all to copy");
+    both.close();
+}
+
+#[test]
+fn two_views_stand_side_by_side_in_one_pass() {
+    if !go_on("drawing", "two_views_stand_side_by_side_in_one_pass") {
+        return;
+    }
+    let [width, height] = SIZE_PX;
+    let wide = [2 * width, height];
+    let right = i32::try_from(width).unwrap();
+    let host = Rc::new(Host::new().unwrap());
+    let scene = config::load("small").unwrap();
+    let mut facade = Facade::new(&host, &scene, wide);
+    let mut canvas = Canvas::new(&host, wide, facade.renderer.settings()).unwrap();
+    let terrain = open_small(Some(&waiting()));
+    // Each view has as many frames in flight as the canvas.
+    let renderer = renderer_with(terrain, &canvas, 2 * IN_FLIGHT);
+    for frame in 0..20 {
+        let looks = [frame, frame + 70];
+        let views = looks.map(|frame| dive_in_rust(frame, &scene)).to_vec();
+        facade.fly(frame as f64 / 60.0, views, None);
+        fly_views(terrain, frame, &looks.map(dive), None);
+    }
+    let (buffer, index) = canvas.begin().unwrap();
+    let frames = [index, index + IN_FLIGHT].map(|index| frame_of((buffer, index)));
+    // SAFETY: as in `draw_in_c`; both views are within the canvas.
+    unsafe {
+        for (view, frame) in (0..).zip(&frames) {
+            let picture = ovf_picture { view, ..sized() };
+            must(ovf_renderer_record_uploads(renderer, frame, &picture, null_mut()));
+        }
+        canvas.begin_pass(buffer);
+        for range in (0..3).rev() {
+            canvas.clear_depth(buffer);
+            for (frame, left_px) in frames.iter().zip([0, right]) {
+                must(ovf_renderer_record_range(renderer, frame, range, left_px, 0));
+            }
+        }
+        canvas.host.device.cmd_end_render_pass(buffer);
+    }
+    canvas.submit().unwrap();
+    let found = canvas.read_pixels().unwrap();
+    for (half, at_px) in [[0, 0], [right, 0]].into_iter().enumerate() {
+        let expected = facade.draw((half, at_px), Show::Shaded);
+        let rows = |pixels: &[u8]| {
+            let halves = pixels.chunks_exact(4 * width as usize).skip(half).step_by(2);
+            halves.map(<[u8]>::to_vec).collect::<Vec<_>>().concat()
+        };
+        assert!(rows(&expected) == rows(&found), "view {half}");
+    }
     facade.close();
     must(ovf_renderer_destroy(renderer));
     must(ovf_terrain_destroy(terrain));
@@ -267,7 +283,7 @@ fn look_at_hills(step: u32, scene: &SceneSettings) -> View {
     let at = Geodetic {
         lat_rad: 46.85 * DEGREE,
         lon_rad: (-121.76 + 1e-4 * f64::from(step)) * DEGREE,
-        height_m: EYE_HEIGHT_M,
+        height_m: 3000.0,
     };
     let [yaw, pitch, roll] = [40.0 * DEGREE, -8.0 * DEGREE, 0.0].map(Radians);
     View {
@@ -279,8 +295,6 @@ fn look_at_hills(step: u32, scene: &SceneSettings) -> View {
     }
 }
 
-const EYE_HEIGHT_M: f64 = 3000.0;
-
 #[test]
 fn the_example_in_c_draws_the_facade_s_picture_without_a_message() {
     let test = "the_example_in_c_draws_the_facade_s_picture_without_a_message";
@@ -289,7 +303,7 @@ fn the_example_in_c_draws_the_facade_s_picture_without_a_message() {
     }
     let out = tempfile::tempdir().unwrap();
     let header = ["/usr/include", "/usr/local/include"];
-    if !header.iter().any(|at| std::path::Path::new(at).join("vulkan/vulkan.h").exists()) {
+    if !header.iter().any(|at| Path::new(at).join("vulkan/vulkan.h").exists()) {
         println!("{test} skipped: vulkan/vulkan.h is not installed");
         return;
     }
@@ -307,7 +321,7 @@ fn the_example_in_c_draws_the_facade_s_picture_without_a_message() {
     let mut facade = Facade::new(&host, &scene, [960, 540]);
     let mut frame = 0;
     let mut fly = |facade: &mut Facade, step| {
-        facade.fly(0.1 * f64::from(frame), look_at_hills(step, &scene), None);
+        facade.fly(0.1 * f64::from(frame), vec![look_at_hills(step, &scene)], None);
         frame += 1;
         let counts = &facade.output.counts;
         counts.leaves == 0 || counts.splits + counts.merges + counts.wanted > 0
@@ -316,7 +330,7 @@ fn the_example_in_c_draws_the_facade_s_picture_without_a_message() {
     let mut expected = Vec::new();
     for step in 0..8 {
         fly(&mut facade, step);
-        expected = facade.draw(Show::Shaded);
+        expected = facade.draw((0, [0, 0]), Show::Shaded);
     }
     let expected: Vec<u8> = expected.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     assert_eq!(picture.len(), expected.len());
@@ -331,7 +345,7 @@ fn the_example_in_c_draws_the_facade_s_picture_without_a_message() {
 }
 
 /// The pixels of a binary PPM with a head of three lines.
-fn ppm(file: &std::path::Path) -> Vec<u8> {
+fn ppm(file: &Path) -> Vec<u8> {
     let bytes = std::fs::read(file).unwrap();
     let mut parts = bytes.splitn(4, |&byte| byte == b'\n');
     assert_eq!(parts.next(), Some(&b"P6"[..]));
@@ -353,12 +367,10 @@ fn projections_are_the_facade_s() {
         let mut found = [f32::NAN; 16];
         // SAFETY: the pointer is of 16 numbers that outlive the call.
         must(unsafe { ovf_terrain_projection(terrain, 0, range, found.as_mut_ptr()) });
-        let expected =
-            overfly::render_vk::projection(&output.views[0], range as usize, order).unwrap();
-        assert_eq!(
-            found.map(f32::to_bits),
-            expected.as_flattened().try_into().map(|all: [f32; 16]| all.map(f32::to_bits)).unwrap()
-        );
+        let view = &output.views[0];
+        let expected = overfly::render_vk::projection(view, range as usize, order).unwrap();
+        let bits = |numbers: &[f32]| numbers.iter().map(|n| n.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&found), bits(expected.as_flattened()), "range {range}");
     }
     must(ovf_terrain_destroy(terrain));
 }

@@ -14,5 +14,6 @@ mod handles;
 mod header;
 mod hosts;
 mod junk;
+mod lent;
 mod queries;
 mod renderers;

@@ -6,9 +6,9 @@
 //! Not here: what is drawn (`drawing`).
 
 use super::calls::*;
-use super::drawing::host_vulkan::canvas::{Canvas, IN_FLIGHT};
-use super::drawing::host_vulkan::host::Host;
-use super::drawing::*;
+use super::lent::host_vulkan::canvas::{Canvas, IN_FLIGHT};
+use super::lent::host_vulkan::host::Host;
+use super::lent::*;
 use overfly::config;
 use overfly::render_vk::RendererSettings;
 use overfly::render_vk::ash::{self, vk};
@@ -233,7 +233,7 @@ fn what_a_host_lends_wrongly_is_named() {
         let status = made(terrain, (lent.0, target), |_, _, _| {});
         ends(status, OVF_INVALID, "allowed is one count that the device has");
     }
-    flown(terrain, 2);
+    dived(terrain, 2);
     let renderer = renderer_of(terrain, &canvas);
     let frame = frame_of(canvas.begin().unwrap());
     let beyond = ovf_host_frame { index: IN_FLIGHT, ..frame };
@@ -270,7 +270,7 @@ fn a_renderer_outlives_its_terrain_and_is_destroyed_once() {
     let mut canvas = canvas();
     let terrain = open_small(Some(&waiting()));
     let (renderer, other) = (renderer_of(terrain, &canvas), renderer_of(terrain, &canvas));
-    flown(terrain, 20);
+    dived(terrain, 20);
     let picture: ovf_picture = sized();
     let first = draw_in_c(&mut canvas, renderer, picture);
     let drawn = canvas.read_pixels().unwrap();
@@ -317,7 +317,7 @@ fn ranges_are_recorded_by_threads_at_once_and_other_calls_end_as_busy() {
     let mut canvas = canvas();
     let terrain = open_small(Some(&waiting()));
     let renderer = renderer_of(terrain, &canvas);
-    flown(terrain, 20);
+    dived(terrain, 20);
     let index = canvas.next;
     draw_in_c(&mut canvas, renderer, sized());
     canvas.host.wait_idle().unwrap();
@@ -325,17 +325,7 @@ fn ranges_are_recorded_by_threads_at_once_and_other_calls_end_as_busy() {
     let (device, family, pass) = (&host.device, host.family, canvas.pass);
     std::thread::scope(|scope| {
         for range in 0..3 {
-            scope.spawn(move || {
-                let (pool, buffer) = secondary(device, family, pass);
-                let frame = frame_of((buffer, index));
-                for _ in 0..200 {
-                    // SAFETY: the pointer is of a value that outlives the call; the buffer is this
-                    // thread's, and continues the pass.
-                    must(unsafe { ovf_renderer_record_range(renderer, &frame, range, 0, 0) });
-                }
-                // SAFETY: the pool is the device's, and nothing of it was submitted.
-                unsafe { device.destroy_command_pool(pool, None) };
-            });
+            scope.spawn(move || record_often(renderer, (device, family, pass), (index, range)));
         }
     });
     let (stops, busy) = (AtomicBool::new(false), AtomicU64::new(0));
@@ -359,6 +349,23 @@ fn ranges_are_recorded_by_threads_at_once_and_other_calls_end_as_busy() {
     must(ovf_terrain_destroy(terrain));
     drop(host);
     close(canvas);
+}
+
+/// Records a range again and again, into a buffer of this thread's.
+fn record_often(
+    renderer: ovf_renderer,
+    (device, family, pass): (&ash::Device, u32, vk::RenderPass),
+    (index, range): (u32, u32),
+) {
+    let (pool, buffer) = secondary(device, family, pass);
+    let frame = frame_of((buffer, index));
+    for _ in 0..200 {
+        // SAFETY: the pointer is of a value that outlives the call; the buffer is this thread's, and
+        // continues the pass.
+        must(unsafe { ovf_renderer_record_range(renderer, &frame, range, 0, 0) });
+    }
+    // SAFETY: the pool is the device's, and nothing of it was submitted.
+    unsafe { device.destroy_command_pool(pool, None) };
 }
 
 /// A secondary command buffer that is being recorded, and its pool.
