@@ -8,7 +8,7 @@
  * Pointers. Each is null or good until the call returns, for as many elements as the function says,
  * aligned for its type, and nobody else writes there meanwhile. Texts are UTF-8 with a NUL at their
  * end. Null is answered with OVF_NULL_POINTER where it may not be. Nothing of the host's is kept
- * but the functions and `user` of ovf_host.
+ * but the functions and `user` of ovf_host, and what ovf_device and ovf_target name of Vulkan.
  *
  * Structs that begin with struct_size want sizeof there, also where they are only written: later
  * versions append fields, and take the shorter structs of older programs. Set all of a struct to 0
@@ -18,11 +18,16 @@
  * the north pole. Heights are above the ellipsoid unless a name says otherwise.
  *
  * Threads. Calls on one terrain are for one thread at a time, whichever: another one gets OVF_BUSY
- * and does not wait. For any thread at any time are ovf_terrain_work, _run_task and _load_page,
- * all of ovf_ground_*, ovf_last_error and ovf_version.
+ * and does not wait. So are calls on one renderer, but that ovf_renderer_record_range may be in
+ * several; ovf_renderer_record_uploads is a call on the terrain as well. For any thread at any time
+ * are ovf_terrain_work, _run_task and _load_page, all of ovf_ground_*, ovf_last_error and
+ * ovf_version.
  *
- * Drawing through Vulkan into command buffers of the host is not part of this version. It will be
- * functions ovf_vulkan_* beside these, over the same terrains.
+ * Vulkan is the host's: none of it is needed to build or link this, nor to run it without
+ * ovf_renderer. What can be looked at is checked; for the rest the host vouches. Its handles are
+ * good, belong together and stay until the renderer is destroyed, and so does the library that they
+ * are of; a device has finished what was recorded when the renderer is destroyed. Command buffers
+ * are of the renderer's queue family and are recorded by no other thread during a call.
  */
 
 #ifndef OVERFLY_H
@@ -120,6 +125,76 @@
  * `ovf_view.attitude`: it is in `yaw_rad`, `pitch_rad` and `roll_rad`.
  */
 #define OVF_ATTITUDE_ANGLES 1
+
+/**
+ * `ovf_limits.depth_format`: floats of 32 bits.
+ */
+#define OVF_DEPTH_D32F 0
+
+/**
+ * `ovf_limits.depth_format`: whole numbers of 24 bits.
+ */
+#define OVF_DEPTH_D24 1
+
+/**
+ * `ovf_limits.depth_order`: 1 is nearest; depth is cleared to 0, and what is greater is drawn.
+ */
+#define OVF_DEPTH_REVERSED 0
+
+/**
+ * `ovf_limits.depth_order`: 0 is nearest; depth is cleared to 1, and what is less is drawn.
+ */
+#define OVF_DEPTH_FORWARD 1
+
+/**
+ * `ovf_picture.show`: the ground as one would see it.
+ */
+#define OVF_SHOW_SHADED 0
+
+/**
+ * `ovf_picture.show`: edges of all triangles, those of patches bolder.
+ */
+#define OVF_SHOW_WIREFRAME 1
+
+/**
+ * `ovf_picture.show`: levels of leaves.
+ */
+#define OVF_SHOW_LEVEL 2
+
+/**
+ * `ovf_picture.show`: bound on the error on the screen: white at the tolerance, red from twice on.
+ */
+#define OVF_SHOW_SCREEN_ERROR 3
+
+/**
+ * `ovf_picture.show`: depths of pages; red where a page is lacking.
+ */
+#define OVF_SHOW_RESIDENCY 4
+
+/**
+ * `ovf_picture.show`: normals: east red, north green, up blue.
+ */
+#define OVF_SHOW_NORMALS 5
+
+/**
+ * `ovf_picture.show`: which depth range drew it.
+ */
+#define OVF_SHOW_DEPTH_RANGE 6
+
+/**
+ * `ovf_picture.show`: all patches there are; red those that no view sees.
+ */
+#define OVF_SHOW_CULLED 7
+
+/**
+ * `ovf_picture.backdrop`: the farthest range draws the sky behind the ground.
+ */
+#define OVF_BACKDROP_SKY 0
+
+/**
+ * `ovf_picture.backdrop`: what the host cleared to stays behind the ground.
+ */
+#define OVF_BACKDROP_HOST 1
 
 /**
  * `ovf_query.kind`: the surface of one level. It depends on the scene, the place and the level
@@ -240,9 +315,13 @@ enum ovf_status
    */
   OVF_RECORDING = 11,
   /**
-   * A bug of overfly's. The terrain that it happened in can only be destroyed.
+   * A bug of overfly's. The terrain or renderer that it happened in can only be destroyed.
    */
   OVF_PANIC = 12,
+  /**
+   * A call of Vulkan failed, or the device cannot draw the ground.
+   */
+  OVF_VULKAN = 13,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -576,7 +655,7 @@ typedef struct ovf_frame {
 } ovf_frame;
 
 /**
- * What stays the same as long as a terrain lives: how large buffers must be, and the body.
+ * What stays the same as long as a terrain lives: how large buffers must be, body and depth.
  */
 typedef struct ovf_limits {
   /**
@@ -631,6 +710,14 @@ typedef struct ovf_limits {
    * 0.
    */
   uint64_t reserved;
+  /**
+   * `OVF_DEPTH_…`: numbers of the depth buffer that the scene's ranges are made for.
+   */
+  uint32_t depth_format;
+  /**
+   * `OVF_DEPTH_…`: which way they run.
+   */
+  uint32_t depth_order;
 } ovf_limits;
 
 /**
@@ -806,6 +893,217 @@ typedef struct ovf_eye {
    */
   double sun_direction_ecef[3];
 } ovf_eye;
+
+/**
+ * What a renderer is made for, beside its terrain.
+ */
+typedef struct ovf_renderer_settings {
+  /**
+   * `sizeof(ovf_renderer_settings)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Frames that the device may be behind, 1 to 16; 0 is 2. A host that shows several views takes
+   * as many for each.
+   */
+  uint32_t frames_in_flight;
+} ovf_renderer_settings;
+
+/**
+ * A Vulkan device of the host, which stays the host's. Handles are cast to pointers; nothing of
+ * Vulkan is looked for but through `get_instance_proc_addr`.
+ */
+typedef struct ovf_device {
+  /**
+   * `sizeof(ovf_device)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Family of `queue`, which draws and computes. What is recorded is submitted to it.
+   */
+  uint32_t queue_family;
+  /**
+   * `VkApplicationInfo::apiVersion` of the instance, at least that of Vulkan 1.1.
+   */
+  uint32_t api_version;
+  /**
+   * 1: the instance has `VK_EXT_debug_utils`, and objects are named; 0: it has not.
+   */
+  uint32_t debug_utils;
+  /**
+   * 1: the device was made with `multiDrawIndirect`, which is needed.
+   */
+  uint32_t multi_draw_indirect;
+  /**
+   * 1: it was made with `samplerAnisotropy`: the ground's texture is sharper far off; 0: not.
+   */
+  uint32_t sampler_anisotropy;
+  /**
+   * `vkGetInstanceProcAddr`, cast to `void (*)(void)`.
+   */
+  void (*get_instance_proc_addr)(void);
+  /**
+   * `VkInstance`.
+   */
+  void *instance;
+  /**
+   * `VkPhysicalDevice`.
+   */
+  void *physical_device;
+  /**
+   * `VkDevice`.
+   */
+  void *device;
+  /**
+   * `VkQueue`, used by `ovf_renderer_new_v1` and at no other time.
+   */
+  void *queue;
+} ovf_device;
+
+/**
+ * Where the host draws: a subpass with one colour attachment and depth, without multiview.
+ *
+ * What is drawn is linear light: the colour has an sRGB format or floats. Any pass will do later
+ * that is compatible with this one.
+ */
+typedef struct ovf_target {
+  /**
+   * `sizeof(ovf_target)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Which subpass.
+   */
+  uint32_t subpass;
+  /**
+   * `VkRenderPass`, cast; stays until the renderer is destroyed.
+   */
+  uint64_t render_pass;
+  /**
+   * `VkFormat` of the colour attachment.
+   */
+  uint32_t colour_format;
+  /**
+   * `VkFormat` of the depth attachment, as `ovf_limits.depth_format` has it, with stencil or
+   * without: `VK_FORMAT_D32_SFLOAT…` for `OVF_DEPTH_D32F`, those of 24 bits for `OVF_DEPTH_D24`.
+   */
+  uint32_t depth_format;
+  /**
+   * `VkSampleCountFlagBits` of both.
+   */
+  uint32_t samples;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} ovf_target;
+
+/**
+ * What draws a terrain into command buffers of the host. A number, as `ovf_terrain` is.
+ */
+typedef struct ovf_renderer {
+  /**
+   * Not for the host.
+   */
+  uint64_t bits;
+} ovf_renderer;
+
+/**
+ * Device memory of a renderer.
+ */
+typedef struct ovf_device_memory {
+  /**
+   * `sizeof(ovf_device_memory)`, set by the host.
+   */
+  uint32_t struct_size;
+  /**
+   * Buffers and images.
+   */
+  uint32_t allocations;
+  /**
+   * Bytes of all of them.
+   */
+  uint64_t bytes;
+} ovf_device_memory;
+
+/**
+ * Where a host records: one of its command buffers, for one of its frames in flight.
+ */
+typedef struct ovf_host_frame {
+  /**
+   * `sizeof(ovf_host_frame)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Which frame in flight, below `ovf_renderer_settings.frames_in_flight`. A host that shows
+   * several views takes another one for each.
+   */
+  uint32_t index;
+  /**
+   * `VkCommandBuffer`, primary or secondary, which is being recorded.
+   */
+  void *command_buffer;
+} ovf_host_frame;
+
+/**
+ * What a picture shows.
+ */
+typedef struct ovf_picture {
+  /**
+   * `sizeof(ovf_picture)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Which view of the terrain's last frame.
+   */
+  uint32_t view;
+  /**
+   * `OVF_SHOW_…`.
+   */
+  uint32_t show;
+  /**
+   * `OVF_BACKDROP_…`.
+   */
+  uint32_t backdrop;
+} ovf_picture;
+
+/**
+ * How much work a picture is.
+ */
+typedef struct ovf_draw_report {
+  /**
+   * `sizeof(ovf_draw_report)`, set by the host.
+   */
+  uint32_t struct_size;
+  /**
+   * Patches copied to the device.
+   */
+  uint32_t uploaded_patches;
+  /**
+   * The same in bytes.
+   */
+  uint64_t uploaded_bytes;
+  /**
+   * Patches drawn, summed over depth ranges.
+   */
+  uint32_t draws;
+  /**
+   * Indirect draw commands that draw them.
+   */
+  uint32_t commands;
+  /**
+   * Triangles of all draws.
+   */
+  uint64_t triangles;
+  /**
+   * Pipelines made so far.
+   */
+  uint32_t pipelines;
+  /**
+   * Depth ranges to record.
+   */
+  uint32_t ranges;
+} ovf_draw_report;
 
 /**
  * A snapshot of the ground: it never changes, and answers any thread without a lock and, from a
@@ -1328,6 +1626,77 @@ ovf_status ovf_terrain_scene_text(struct ovf_terrain terrain,
                                   char *text,
                                   uint64_t capacity,
                                   uint64_t *count);
+
+/**
+ * Makes a renderer of a terrain: takes memory on the host's device, makes pipelines, copies what
+ * never changes and tests the driver's arithmetic. Submits to the queue and waits; nobody else uses
+ * the queue meanwhile. Other calls on the terrain may go on. `settings` may be null.
+ *
+ * The 1 in its name is the version of this border, as in `ovf_terrain_new_v1`.
+ */
+ovf_status ovf_renderer_new_v1(struct ovf_terrain terrain,
+                               const struct ovf_renderer_settings *settings,
+                               const struct ovf_device *device,
+                               const struct ovf_target *target,
+                               struct ovf_renderer *renderer);
+
+/**
+ * Ends a renderer, whose terrain may be gone already: gives all back that it took of the device,
+ * which has finished whatever was recorded. To be called before the host destroys the device.
+ */
+ovf_status ovf_renderer_destroy(struct ovf_renderer renderer);
+
+/**
+ * Tells that a command buffer with uploads was thrown away instead of submitted: all of the ground
+ * is uploaded again.
+ */
+ovf_status ovf_renderer_note_lost(struct ovf_renderer renderer);
+
+/**
+ * Device memory that a renderer takes now.
+ */
+ovf_status ovf_renderer_memory(struct ovf_renderer renderer, struct ovf_device_memory *memory);
+
+/**
+ * Makes a picture of the terrain's last frame ready and records the copies of what is new, with
+ * the barriers that they need. Outside a pass, once for each frame and index, before its draws;
+ * the device has finished what was recorded with this index before. `report` may be null.
+ *
+ * Buffers are submitted in the order in which their uploads were recorded. Where it fails nothing
+ * was recorded; after `OVF_VULKAN` all of the ground is uploaded again. Of the terrain it is a call
+ * as any: `OVF_BUSY` during a frame, `OVF_STALE` once it was destroyed.
+ */
+ovf_status ovf_renderer_record_uploads(struct ovf_renderer renderer,
+                                       const struct ovf_host_frame *frame,
+                                       const struct ovf_picture *picture,
+                                       struct ovf_draw_report *report);
+
+/**
+ * Records the draws of one depth range, in the subpass that the renderer was made for, after the
+ * picture's uploads. From the farthest, `ovf_draw_report.ranges` - 1, to the nearest, 0; the depth
+ * was cleared since the one before, to 0 where `ovf_limits.depth_order` is reversed, else to 1. The
+ * picture's top left corner is at `left_px`, `top_px` of the target, within which it fits.
+ *
+ * After it the range's depth is there for geometry of the host's, with `ovf_terrain_projection`.
+ * Pipelines, descriptor sets 0 to 2, push constants, vertex and index buffers, viewport and scissor
+ * are others then. Several threads may record ranges at once, each into a buffer of its own.
+ */
+ovf_status ovf_renderer_record_range(struct ovf_renderer renderer,
+                                     const struct ovf_host_frame *frame,
+                                     uint32_t range,
+                                     int32_t left_px,
+                                     int32_t top_px);
+
+/**
+ * The projection of one depth range of a view, as the ground is drawn with it: 16 numbers, column by
+ * column, from eye space (x right, y up, z backward, metres from the eye) to Vulkan's clip space (y
+ * down, z from 0 to w). With the axes and the eye of `ovf_terrain_eye`, a point's z and w are the
+ * ground's to the last bit; only what is between the range's borders is seen.
+ */
+ovf_status ovf_terrain_projection(struct ovf_terrain terrain,
+                                  uint32_t view,
+                                  uint32_t range,
+                                  float *columns);
 
 /**
  * The ground of all pages that are there now. Some 20 µs for each page that came since the last

@@ -15,9 +15,20 @@ use overfly::core::geodesy::TwoFloat;
 use overfly::core::lod::diamonds::leaf_key;
 use overfly::core::mesh::{PatchMorph, PatchVertex, Patches};
 use overfly::core::scene::extract;
+use overfly::core::settings::{DepthFormat, DepthOrder};
 use std::ffi::c_char;
 
-/// What stays the same as long as a terrain lives: how large buffers must be, and the body.
+/// `ovf_limits.depth_format`: floats of 32 bits.
+pub const OVF_DEPTH_D32F: u32 = 0;
+/// `ovf_limits.depth_format`: whole numbers of 24 bits.
+pub const OVF_DEPTH_D24: u32 = 1;
+
+/// `ovf_limits.depth_order`: 1 is nearest; depth is cleared to 0, and what is greater is drawn.
+pub const OVF_DEPTH_REVERSED: u32 = 0;
+/// `ovf_limits.depth_order`: 0 is nearest; depth is cleared to 1, and what is less is drawn.
+pub const OVF_DEPTH_FORWARD: u32 = 1;
+
+/// What stays the same as long as a terrain lives: how large buffers must be, body and depth.
 #[repr(C)]
 #[derive(Clone, Copy, Zeroable)]
 pub struct ovf_limits {
@@ -47,6 +58,10 @@ pub struct ovf_limits {
     pub body_f: f64,
     /// 0.
     pub reserved: u64,
+    /// `OVF_DEPTH_…`: numbers of the depth buffer that the scene's ranges are made for.
+    pub depth_format: u32,
+    /// `OVF_DEPTH_…`: which way they run.
+    pub depth_order: u32,
 }
 
 /// A vertex: 36 bytes, as a GPU may take them. This struct never changes.
@@ -193,6 +208,14 @@ fn limits_of(state: &State) -> ovf_limits {
         body_a_m: scene.body.a_m,
         body_f: scene.body.f,
         reserved: 0,
+        depth_format: match scene.depth.format {
+            DepthFormat::D32F => OVF_DEPTH_D32F,
+            DepthFormat::D24 => OVF_DEPTH_D24,
+        },
+        depth_order: match scene.depth.order {
+            DepthOrder::Reversed => OVF_DEPTH_REVERSED,
+            DepthOrder::Forward => OVF_DEPTH_FORWARD,
+        },
     }
 }
 
@@ -502,7 +525,8 @@ fn give_text(
     caller.fill("text", (start.cast::<i8>(), capacity, count), bytes.into_iter())
 }
 
-fn view_of(state: &State, view: u32) -> Result<&ViewDraws, Fault> {
+/// A view of the last frame.
+pub fn view_of(state: &State, view: u32) -> Result<&ViewDraws, Fault> {
     let count = state.output.views.len();
     state.output.views.get(view as usize).ok_or_else(|| {
         Fault::invalid(format!("view is {view}, allowed is below {count}: those of the last frame"))

@@ -150,6 +150,7 @@ pub unsafe extern "C" fn ovf_terrain_frame(
             take_in(caller, &input, state)?;
             let outcome = state.overfly.frame(&mut state.input, &mut state.output);
             state.input.scene = None;
+            state.note_news();
             outcome?;
             state.time_s = input.time_s;
             Ok(numbers(&state.output))

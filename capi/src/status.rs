@@ -5,6 +5,7 @@
 //! Keeps: each thread's last sentence, in memory of its own: a fault allocates nothing here.
 //! Not here: how a question to the ground was answered (`queries`).
 
+use overfly::render_vk::{DrawError, StartError};
 use overfly::{ChangeError, FrameError, OpenError, RecordError, RequestError};
 use std::cell::RefCell;
 use std::error::Error;
@@ -41,8 +42,10 @@ pub enum ovf_status {
     OVF_PAGE = 10,
     /// A recording cannot be begun or goes no further.
     OVF_RECORDING = 11,
-    /// A bug of overfly's. The terrain that it happened in can only be destroyed.
+    /// A bug of overfly's. The terrain or renderer that it happened in can only be destroyed.
     OVF_PANIC = 12,
+    /// A call of Vulkan failed, or the device cannot draw the ground.
+    OVF_VULKAN = 13,
 }
 
 pub use ovf_status::*;
@@ -101,6 +104,30 @@ impl From<FrameError> for Fault {
             FrameError::Scene(ChangeError::Record(_)) | FrameError::Record(_) => OVF_RECORDING,
             FrameError::Scene(_) => OVF_SCENE,
             FrameError::Stage(_) | FrameError::Draw(_) => OVF_PANIC,
+        };
+        Self::of(status, &error)
+    }
+}
+
+impl From<StartError> for Fault {
+    fn from(error: StartError) -> Self {
+        let status = match &error {
+            StartError::Host { .. } | StartError::Setting { .. } => OVF_INVALID,
+            _ => OVF_VULKAN,
+        };
+        Self::of(status, &error)
+    }
+}
+
+impl From<DrawError> for Fault {
+    fn from(error: DrawError) -> Self {
+        let status = match &error {
+            DrawError::Frame { .. } | DrawError::Range { .. } | DrawError::NothingDrawn => {
+                OVF_INVALID
+            }
+            DrawError::Vulkan { .. } | DrawError::Memory { .. } => OVF_VULKAN,
+            // A renderer is made for its terrain, which keeps what these speak of.
+            _ => OVF_PANIC,
         };
         Self::of(status, &error)
     }

@@ -7,6 +7,7 @@
 
 use crate::border::{Caller, answer};
 use crate::host::{brought, ovf_host};
+use crate::news::News;
 use crate::scene::{ovf_scene, settings};
 use crate::status::{Fault, OVF_BUSY, OVF_PAGE, OVF_PANIC, OVF_STALE, ovf_status};
 use crate::table::Table;
@@ -19,7 +20,7 @@ use overfly::sources::Sources;
 use overfly::{Overfly, Ticket};
 use parking_lot::Mutex;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// Most terrains that are open at once.
 const TERRAINS_MAX: usize = 256;
@@ -67,8 +68,21 @@ pub struct State {
     pub ticket_serial: u64,
     /// Time of the last frame.
     pub time_s: f64,
+    /// What renderers of this terrain were not told yet.
+    pub news: Vec<Weak<News>>,
     /// A call was left by a panic, or a stage was: nobody knows what holds.
     broken: bool,
+}
+
+impl State {
+    /// Keeps what the last frame made new for each renderer, until it records.
+    pub fn note_news(&mut self) {
+        let output = &self.output;
+        self.news.retain(|news| {
+            let news = news.upgrade();
+            news.inspect(|news| news.note(&output.built, &output.tiles)).is_some()
+        });
+    }
 }
 
 impl Place {
@@ -84,6 +98,7 @@ impl Place {
             tickets: BTreeMap::new(),
             ticket_serial: 0,
             time_s: 0.0,
+            news: Vec::new(),
             broken: false,
         };
         Self { state: Mutex::new(Some(Box::new(state))), crew, tasks, supply: Mutex::new(supply) }
@@ -123,6 +138,8 @@ pub fn with_made<T>(
             // What is made of other sources does not belong here, and regions were held of them.
             *supply = Supply { sources: sources.clone(), made: Vec::new() };
             state.tickets.clear();
+            let tiles = state.overfly.terrain().tiles();
+            state.news.iter().filter_map(Weak::upgrade).for_each(|news| news.note(&[], &tiles));
         }
         outcome
     })

@@ -31,6 +31,7 @@ pub const DRAWING: &[Package] = &[
 /// What tests of drawing need as well.
 pub const VALIDATION: &[Package] = &[
     Package { name: "vulkan-validationlayers", why: "Vulkan's own checks, for the tests" },
+    Package { name: "libvulkan-dev", why: "Vulkan's headers, for the example of a host in C" },
     Package { name: "xvfb", why: "a screen that nobody sees, for the tests of the window" },
 ];
 

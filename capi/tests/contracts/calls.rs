@@ -13,12 +13,14 @@ use overfly::core::settings::SceneSettings;
 use overfly::core::units::Radians;
 use overfly::{Host, Overfly, Pages, config};
 use overfly_c::columns::*;
+use overfly_c::drawing::*;
 use overfly_c::frame::*;
 use overfly_c::ground::*;
 use overfly_c::host::*;
 use overfly_c::queries::*;
 use overfly_c::rays::*;
 use overfly_c::regions::*;
+use overfly_c::renderer::*;
 use overfly_c::scene::*;
 use overfly_c::status::*;
 use overfly_c::terrain::*;
@@ -26,7 +28,7 @@ use std::ffi::{CStr, CString};
 use std::ptr::null;
 
 /// Structs of the border and their sizes here.
-pub const SIZES: [(&str, usize); 23] = [
+pub const SIZES: [(&str, usize); 31] = [
     ("ovf_scene", size_of::<ovf_scene>()),
     ("ovf_edit", size_of::<ovf_edit>()),
     ("ovf_host", size_of::<ovf_host>()),
@@ -40,6 +42,14 @@ pub const SIZES: [(&str, usize); 23] = [
     ("ovf_range", size_of::<ovf_range>()),
     ("ovf_patch_columns", size_of::<ovf_patch_columns>()),
     ("ovf_eye", size_of::<ovf_eye>()),
+    ("ovf_renderer", size_of::<ovf_renderer>()),
+    ("ovf_device", size_of::<ovf_device>()),
+    ("ovf_target", size_of::<ovf_target>()),
+    ("ovf_renderer_settings", size_of::<ovf_renderer_settings>()),
+    ("ovf_device_memory", size_of::<ovf_device_memory>()),
+    ("ovf_host_frame", size_of::<ovf_host_frame>()),
+    ("ovf_picture", size_of::<ovf_picture>()),
+    ("ovf_draw_report", size_of::<ovf_draw_report>()),
     ("ovf_ground", size_of::<ovf_ground>()),
     ("ovf_query", size_of::<ovf_query>()),
     ("ovf_places", size_of::<ovf_places>()),

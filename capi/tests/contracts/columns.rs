@@ -58,6 +58,14 @@ fn patches_vertices_and_indices_are_those_of_the_facade() {
     let patches = overfly.terrain().patches();
     assert_eq!(limits.patches_max, overfly.terrain().limits().leaves);
     assert_eq!((limits.body_a_m, limits.body_f), (1000.0, 0.0));
+    let depth = (limits.depth_format, limits.depth_order);
+    assert_eq!(depth, (OVF_DEPTH_D32F, OVF_DEPTH_REVERSED));
+    // A program that was built before there was depth in it.
+    let mut older = ovf_limits { struct_size: 64, depth_format: 77, depth_order: 78, ..sized() };
+    // SAFETY: the pointer is of a value that outlives the call.
+    must(unsafe { ovf_terrain_limits(terrain, &raw mut older) });
+    assert_eq!((older.patches_max, older.body_a_m), (limits.patches_max, 1000.0));
+    assert_eq!((older.struct_size, older.depth_format, older.depth_order), (64, 77, 78));
 
     // SAFETY: `all` gives buffers that are as long as they say; so in all calls below.
     let indices =

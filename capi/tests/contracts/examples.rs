@@ -34,6 +34,15 @@ fn library() -> PathBuf {
 
 /// Compiles an example and links it with the library; `None` without a compiler.
 fn built(language: &str, source: &str, out: &Path) -> Option<PathBuf> {
+    built_with(language, source, (out, &[]))
+}
+
+/// The same, with more libraries.
+pub fn built_with(
+    language: &str,
+    source: &str,
+    (out, libraries): (&Path, &[&str]),
+) -> Option<PathBuf> {
     let mut compiler = compiler(language)?;
     let standard = if language == "cc" { "-std=c11" } else { "-std=c++17" };
     let program = out.join(source).with_extension("");
@@ -47,13 +56,15 @@ fn built(language: &str, source: &str, out: &Path) -> Option<PathBuf> {
         .arg(&program)
         .arg(format!("-L{}", library.display()))
         .arg(format!("-Wl,-rpath,{}", library.display()))
-        .args(["-loverfly_c", "-lpthread", "-lm"]);
+        .args(["-loverfly_c", "-lpthread", "-lm"])
+        .args(libraries);
     let done = compiler.output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     Some(program)
 }
 
-fn out_of(done: &Output) -> String {
+/// What a program said; it must have succeeded.
+pub fn out_of(done: &Output) -> String {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&done.stdout), text(&done.stderr));
     assert!(done.status.success(), "{}\n{out}\n{err}", done.status);

@@ -7,10 +7,13 @@
 
 mod calls;
 mod columns;
+mod drawing;
 mod examples;
 mod flights;
 mod handles;
 mod header;
 mod hosts;
 mod junk;
+mod lent;
 mod queries;
+mod renderers;

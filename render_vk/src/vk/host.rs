@@ -1,6 +1,6 @@
 //! A host's device, and where on it the host draws.
 //!
-//! In:    handles that the host lends.
+//! In:    handles that the host lends; `vkGetInstanceProcAddr` of hosts without `ash`.
 //! Out:   [`HostDevice`], [`HostTarget`], checked as far as Vulkan tells; [`required_features`].
 //! Keeps: nothing.
 //! Not here: drawing there (`record`), a device of our own (`device`).
@@ -9,6 +9,8 @@ use super::instance::{image_features, properties, version_text};
 use super::pipeline::Subpass;
 use crate::error::StartError;
 use ash::vk;
+use core::ffi::{CStr, c_void};
+use core::ptr::null;
 use overfly_core::settings::DepthFormat;
 
 /// A device that a host lends; nothing of it is ever destroyed here.
@@ -57,7 +59,84 @@ pub fn required_features() -> vk::PhysicalDeviceFeatures {
     vk::PhysicalDeviceFeatures::default().multi_draw_indirect(true)
 }
 
+/// Looks functions up and keeps the name of the first that is not there: `ash` would end the process
+/// when it is called.
+struct Finder<F> {
+    find: F,
+    missing: Option<String>,
+}
+
+impl<F: FnMut(&CStr) -> vk::PFN_vkVoidFunction> Finder<F> {
+    /// For tables of which not every function is used.
+    fn optional(&mut self, name: &CStr) -> *const c_void {
+        (self.find)(name).map_or(null(), |function| function as *const c_void)
+    }
+
+    fn needed(&mut self, name: &CStr) -> *const c_void {
+        let found = self.optional(name);
+        if found.is_null() && self.missing.is_none() {
+            self.missing = Some(name.to_string_lossy().into_owned());
+        }
+        found
+    }
+
+    fn check(&self) -> Result<(), StartError> {
+        match &self.missing {
+            None => Ok(()),
+            Some(name) => refused(
+                "get_instance_proc_addr",
+                format!("without {name}"),
+                "one that finds the functions of Vulkan 1.1 and of enabled extensions",
+            ),
+        }
+    }
+}
+
 impl HostDevice {
+    /// Instance and device of a host that has bare handles and does not use `ash`. `debug_utils` as
+    /// in the field of that name.
+    ///
+    /// # Safety
+    /// - `find` is `vkGetInstanceProcAddr` of the instance's loader, and both handles are good.
+    ///
+    /// # Errors
+    /// [`StartError::Host`]: a function that is needed cannot be found.
+    pub unsafe fn functions(
+        find: vk::PFN_vkGetInstanceProcAddr,
+        (instance, device): (vk::Instance, vk::Device),
+        debug_utils: bool,
+    ) -> Result<(ash::Instance, ash::Device), StartError> {
+        // SAFETY: the caller's promise; names end with a NUL.
+        let find = |name: &CStr| unsafe { find(instance, name.as_ptr()) };
+        let mut finder = Finder { find, missing: None };
+        let first = ash::InstanceFnV1_0::load(|name| finder.needed(name));
+        finder.needed(c"vkGetPhysicalDeviceProperties2");
+        finder.check()?;
+        let of_device = first.get_device_proc_addr;
+        let instance = ash::Instance::from_parts_1_3(
+            instance,
+            first,
+            ash::InstanceFnV1_1::load(|name| finder.optional(name)),
+            ash::InstanceFnV1_3::load(|name| finder.optional(name)),
+        );
+        // SAFETY: it was found, and the device is good.
+        let find = |name: &CStr| unsafe { of_device(device, name.as_ptr()) };
+        let mut finder = Finder { find, missing: None };
+        let first = ash::DeviceFnV1_0::load(|name| finder.needed(name));
+        if debug_utils {
+            finder.needed(c"vkSetDebugUtilsObjectNameEXT");
+        }
+        finder.check()?;
+        let device = ash::Device::from_parts_1_3(
+            device,
+            first,
+            ash::DeviceFnV1_1::load(|name| finder.optional(name)),
+            ash::DeviceFnV1_2::load(|name| finder.optional(name)),
+            ash::DeviceFnV1_3::load(|name| finder.optional(name)),
+        );
+        Ok((instance, device))
+    }
+
     /// Checks what Vulkan tells of a device that was not made here.
     ///
     /// # Safety
