@@ -58,7 +58,7 @@ fn where_the_tolerance_decides_the_mesh_does_not_depend_on_history() {
 #[test]
 fn the_budget_is_never_exceeded_and_is_used() {
     let mut settings = scene(4, 20_000);
-    settings.lod.tolerance.0 = 0.05;
+    settings.lod.tolerance.0 = 0.02;
     let mut rig = Rig::new(&settings, 0);
     for step in 0..120 {
         let position = at(-10.0 + 0.02 * f64::from(step), 12.0, 3_000.0);

@@ -73,9 +73,9 @@ fn decoded_bytes_are_those_of_the_pages_that_arrived_and_steady_frames_allocate_
         let values = run["counters"][name].as_array().unwrap().iter();
         values.map(|value| value.as_f64().unwrap()).collect()
     };
-    // A page without survey and imagery has 54200 bytes, and each that comes is taken or refused.
+    // A page without survey and imagery has 55360 bytes, and each that comes is taken or refused.
     let arrived = column("admitted").into_iter().zip(column("refused"));
-    let bytes: Vec<f64> = arrived.map(|(taken, not)| (taken + not) * 54_200.0).collect();
+    let bytes: Vec<f64> = arrived.map(|(taken, not)| (taken + not) * 55_360.0).collect();
     assert_eq!(column("decoded_bytes"), bytes);
     let total: f64 = bytes.iter().sum();
     assert!(total > 0.0, "no page came in these frames");

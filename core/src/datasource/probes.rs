@@ -42,12 +42,12 @@ pub fn surprise(style: Style) -> f64 {
 /// stream bed or a knoll that is alone, is as large as the octaves there have it. Where all is rugged
 /// less stands out.
 ///
-/// Calibrated as [`surprise`] is: with 0.05 everywhere errors on gentle ground of some planets were up
-/// to 1.25 of their bounds, with this none is above 1 (six places over planets of eight seeds).
+/// Calibrated as [`surprise`] is, over planets of eight seeds: with 0.05 everywhere, errors on gentle
+/// ground were up to 1.25 of their bounds.
 pub fn hidden(ruggedness: f64) -> f64 {
-    let [gentle, rugged] = [0.1, 0.4];
-    let share = ((ruggedness - gentle) / (rugged - gentle)).clamp(0.0, 1.0);
-    0.12 + share * (0.05 - 0.12)
+    let [gentle, rugged] = [(0.1, 0.18), (0.4, 0.06)];
+    let along = ((ruggedness - gentle.0) / (rugged.0 - gentle.0)).clamp(0.0, 1.0);
+    gentle.1 + along * (rugged.1 - gentle.1)
 }
 
 /// Probes lie on eighths of a cell.
