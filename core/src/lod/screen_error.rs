@@ -42,6 +42,7 @@
 //! metre, stays positive for as long as `Lasts` tells.
 
 use super::agenda::Verdict;
+use super::margin::{Margin, greater, least};
 use super::wheel::{Family, Lasts, Motion};
 use crate::camera::Camera;
 use crate::geodesy::Ellipsoid;
@@ -108,7 +109,8 @@ pub struct Sight {
     planes: [DVec3; 4],
     forward: DVec3,
     pixels_per_radian: f64,
-    /// Least square of the cosine between the view direction and anything in the picture.
+    /// Least cosine between the view direction and anything in the picture, and its square.
+    corner_cosine: f64,
     corner_cosine2: f64,
     /// Tangent of that angle.
     corner_tangent: f64,
@@ -139,6 +141,7 @@ impl Sight {
             planes: camera.side_planes,
             forward: camera.forward,
             pixels_per_radian: camera.pixels_per_radian,
+            corner_cosine: (1.0 / camera.corner_factor).sqrt(),
             corner_cosine2: 1.0 / camera.corner_factor,
             corner_tangent: (camera.corner_factor - 1.0).sqrt(),
             near_m: camera.near_m,
@@ -183,8 +186,7 @@ impl Sight {
 
     /// Lower bound on the distance from the eye to the ground of the region, metres.
     pub fn distance_m(&self, region: &Region) -> f64 {
-        let chord = (self.normal - region.normal).length();
-        self.distance_beyond_m(region, chord - region.cap)
+        self.distances_m(region)[PARTS - 1]
     }
 
     /// Lower bound on the distance to ground of the region whose normal is a chord away.
@@ -231,38 +233,52 @@ impl Sight {
         margins_m
     }
 
-    /// What this view sees of the parts of a region.
-    fn look(&self, region: &Region) -> [Look; PARTS] {
+    /// Lower bounds on the distance to each part of a region, metres.
+    fn distances_m(&self, region: &Region) -> [f64; PARTS] {
         let chord = (self.normal - region.normal).length();
+        caps_of(region).map(|cap| self.distance_beyond_m(region, chord - cap))
+    }
+
+    /// What this view sees of the parts of a region that are so far away at least.
+    fn look(&self, region: &Region, distances_m: [f64; PARTS]) -> [Look; PARTS] {
         let (caps, errors_m) = (caps_of(region), errors_of(region));
         let inside_m = self.frustum_margins_m(region);
         [0, 1, 2].map(|part| {
-            let away_m = self.distance_beyond_m(region, chord - caps[part]);
-            let above_m = self.tangent_m + region.tangent_m - away_m;
+            let above_m = self.tangent_m + region.tangent_m - distances_m[part];
             let (cap, error_m) = (caps[part], errors_m[part]);
-            let distance_m = greater(away_m, self.near_m);
+            let distance_m = greater(distances_m[part], self.near_m);
             Look { cap, error_m, distance_m, seen_by_m: least(above_m, inside_m[part]) }
         })
     }
 
-    /// How the screen's plane enlarges errors of a part of a region.
-    fn lens(&self, region: &Region, &Look { cap, distance_m, .. }: &Look) -> Lens {
+    /// What all parts of a region have in common before a lens.
+    fn aim(&self, region: &Region) -> Aim {
         let (low_m, high_m) = (region.low_m, region.high_m);
-        let tallest_m = greater(low_m.abs(), high_m.abs());
-        let ball_m =
-            (1.01 * self.horizon.curvature_m[1] + tallest_m) * cap + 0.5 * (high_m - low_m);
         let away = region.surface - self.eye + region.normal * (0.5 * (low_m + high_m));
-        let far_m = away.length() + ball_m;
         let depth_m = self.forward.dot(away);
-        let corner_m = distance_m * self.corner_cosine2.sqrt();
         let along = self.forward.dot(region.normal);
-        let seen_m = (depth_m * region.normal - along * away).length();
-        let seen_m = least(seen_m + 2.0 * ball_m + 2.0 * cap * far_m, far_m);
-        let aside = least(self.forward.cross(region.normal).length() + cap, 1.0);
-        let ahead = least(along.abs() + cap, 1.0);
+        Aim {
+            tallest_m: greater(low_m.abs(), high_m.abs()),
+            half_m: 0.5 * (high_m - low_m),
+            away_m: away.length(),
+            depth_m,
+            along,
+            seen_m: (depth_m * region.normal - along * away).length(),
+            aside: self.forward.cross(region.normal).length(),
+        }
+    }
+
+    /// How the screen's plane enlarges errors of a part of a region.
+    fn lens(&self, aim: &Aim, &Look { cap, distance_m, .. }: &Look) -> Lens {
+        let ball_m = (1.01 * self.horizon.curvature_m[1] + aim.tallest_m) * cap + aim.half_m;
+        let far_m = aim.away_m + ball_m;
+        let corner_m = distance_m * self.corner_cosine;
+        let seen_m = least(aim.seen_m + 2.0 * ball_m + 2.0 * cap * far_m, far_m);
+        let aside = least(aim.aside + cap, 1.0);
+        let ahead = least(aim.along.abs() + cap, 1.0);
         Lens {
             distance_m,
-            depth_m: greater(depth_m - ball_m, corner_m),
+            depth_m: greater(aim.depth_m - ball_m, corner_m),
             across: greater(aside + self.corner_tangent * ahead, SHRINK_MIN),
             seen_m: greater(seen_m, SHRINK_MIN * far_m),
             far_m,
@@ -285,9 +301,9 @@ impl Sight {
     }
 
     /// Error in pixels of a part of a region, and its lens where it is seen.
-    fn part(&self, region: &Region, look: &Look) -> Option<(f64, Lens)> {
+    fn part(&self, aim: &Aim, look: &Look) -> Option<(f64, Lens)> {
         (look.seen_by_m >= 0.0).then(|| {
-            let lens = self.lens(region, look);
+            let lens = self.lens(aim, look);
             let error_px = look.error_m * self.pixels_per_radian / self.lens_distance_m(&lens);
             (error_px, lens)
         })
@@ -295,13 +311,14 @@ impl Sight {
 
     /// Whether this view may see any of the region.
     pub fn sees(&self, region: &Region) -> bool {
-        self.look(region)[PARTS - 1].seen_by_m >= 0.0
+        self.look(region, self.distances_m(region))[PARTS - 1].seen_by_m >= 0.0
     }
 
     /// Error bound of the region on this view's screen, in pixels.
     pub fn error_px(&self, region: &Region) -> f64 {
-        let parts = self.look(region).map(|look| self.part(region, &look));
-        worst_px(&parts)
+        let looks = self.look(region, self.distances_m(region));
+        let aim = self.aim(region);
+        worst_px(&looks.map(|look| self.part(&aim, &look)))
     }
 
     /// Not less than the distance to any point of the region by which a turn moves it, metres.
@@ -319,34 +336,31 @@ impl Sight {
 
     /// For how long a leaf stays below `threshold_px` in this view, or its error.
     fn leaf(&self, region: &Region, threshold_px: f64) -> Verdict {
-        let looks = self.look(region);
-        let reach_m = |look: &Look| look.error_m * self.pixels_per_radian / threshold_px;
-        let far_m = |look: &Look| look.distance_m - reach_m(look) / self.corner_cosine2;
-        let far_m = looks.iter().map(far_m).fold(f64::INFINITY, least);
+        let distances_m = self.distances_m(region);
+        let parts_m = distances_m.map(|distance_m| greater(distance_m, self.near_m));
+        let reaches_m =
+            errors_of(region).map(|error_m| error_m * self.pixels_per_radian / threshold_px);
+        let far_m = |part: usize| parts_m[part] - reaches_m[part] / self.corner_cosine2;
+        let far_m = least(least(far_m(0), far_m(1)), far_m(2));
         if far_m > 0.0 {
-            let scale_m = looks[0].distance_m;
+            let scale_m = parts_m[0];
             let slack_m = self.path_of(region, far_m, scale_m);
             return Verdict::Certain(Lasts { family: Family::Far, scale_m, slack_m });
         }
-        let parts = looks.map(|look| self.part(region, &look));
+        let looks = self.look(region, distances_m);
+        let aim = self.aim(region);
+        let parts = looks.map(|look| self.part(&aim, &look));
         let error_px = worst_px(&parts);
         if error_px >= threshold_px {
             return Verdict::Urgent(error_px);
         }
-        let stretch = self.stretch(region);
+        let (stretch, farthest_m) = (self.stretch(region), self.farthest_m(region));
         let margin = |part: usize| match &parts[part] {
-            None => self.sight(region, looks[part].seen_by_m).turned(),
-            Some((_, lens)) => self.below(lens, reach_m(&looks[part]), stretch),
+            None => sight((stretch, farthest_m), looks[part].seen_by_m).turned(),
+            Some((_, lens)) => self.below(lens, reaches_m[part], stretch),
         };
         let [own, kids, finer] = [0, 1, 2].map(margin);
         self.lasts(Family::Hidden, own.and(kids).and(finer))
-    }
-
-    /// By how much something is seen.
-    fn sight(&self, region: &Region, slack_m: f64) -> Margin {
-        let farthest_m = self.farthest_m(region);
-        let per_m = self.stretch(region);
-        Margin { slack_m, per_m, per_radian_m: farthest_m }.rounded(farthest_m)
     }
 
     /// A verdict that lasts as long as a margin; the stretch counts on no longer a way than this.
@@ -409,17 +423,18 @@ impl Sight {
 
     /// For how long a parent stays above `threshold_px` in this view, or its error.
     fn parent(&self, region: &Region, threshold_px: f64) -> Verdict {
-        let looks = self.look(region);
-        let parts = looks.map(|look| self.part(region, &look));
+        let looks = self.look(region, self.distances_m(region));
+        let aim = self.aim(region);
+        let parts = looks.map(|look| self.part(&aim, &look));
         let error_px = worst_px(&parts);
         if error_px <= threshold_px {
             return Verdict::Urgent(error_px);
         }
-        let stretch = self.stretch(region);
+        let (stretch, farthest_m) = (self.stretch(region), self.farthest_m(region));
         let margin = |part: usize| match &parts[part] {
             Some((error_px, lens)) if *error_px > threshold_px => {
                 let reach_m = looks[part].error_m * self.pixels_per_radian / threshold_px;
-                let sight = self.sight(region, looks[part].seen_by_m);
+                let sight = sight((stretch, farthest_m), looks[part].seen_by_m);
                 self.above(lens, reach_m, stretch).and(sight)
             }
             _ => Margin { slack_m: f64::NEG_INFINITY, per_m: 1.0, per_radian_m: 0.0 },
@@ -427,6 +442,26 @@ impl Sight {
         let [own, kids, finer] = [0, 1, 2].map(margin);
         self.lasts(Family::Needed, own.or(kids).or(finer))
     }
+}
+
+/// By how much something is seen, for a stretch and the distance of the farthest of it.
+fn sight((per_m, farthest_m): (f64, f64), slack_m: f64) -> Margin {
+    Margin { slack_m, per_m, per_radian_m: farthest_m }.rounded(farthest_m)
+}
+
+/// A region before a view, as far as its parts share it.
+struct Aim {
+    /// Greatest height above or below the ellipsoid, and half their range, metres.
+    tallest_m: f64,
+    half_m: f64,
+    /// Distance and depth of the ball's centre, metres.
+    away_m: f64,
+    depth_m: f64,
+    /// The normal's part along the view direction, and across.
+    along: f64,
+    aside: f64,
+    /// |z·n − (f·n)·X| at the centre, metres.
+    seen_m: f64,
 }
 
 /// How the screen's plane enlarges errors of ground in a ball.
@@ -448,61 +483,6 @@ struct Lens {
 /// A lens is never taken to shrink errors by more than this, so that what depends on it changes
 /// slowly.
 const SHRINK_MIN: f64 = 0.25;
-
-/// By how much something is on one side of a border, and how fast it may lose that.
-#[derive(Clone, Copy)]
-struct Margin {
-    /// Not on that side below 0. Metres.
-    slack_m: f64,
-    /// What is lost for each metre that the eye moves.
-    per_m: f64,
-    /// What is lost for each radian of a turn, or for a change of the threshold by all of itself.
-    per_radian_m: f64,
-}
-
-impl Margin {
-    /// Less the rounding of lengths like this one.
-    fn rounded(self, length_m: f64) -> Self {
-        let rounding_m = 1e-9 * (length_m + self.per_radian_m) + 1e-6;
-        Self { slack_m: self.slack_m - rounding_m.copysign(self.slack_m), ..self }
-    }
-
-    /// The same, and no longer than while what is this far away stays about as far.
-    fn within(self, far_m: f64) -> Self {
-        let most_m = 0.1 * far_m * self.per_m;
-        Self { slack_m: self.slack_m.clamp(-most_m, most_m), ..self }.rounded(far_m)
-    }
-
-    /// The other side of the same border.
-    fn turned(self) -> Self {
-        Self { slack_m: -self.slack_m, ..self }
-    }
-
-    /// How far the eye may move.
-    fn path_m(self) -> f64 {
-        self.slack_m / self.per_m
-    }
-
-    /// While both last.
-    fn and(self, other: Self) -> Self {
-        let path_m = least(self.path_m(), other.path_m());
-        let scale = |one: Self| one.per_radian_m / one.per_m;
-        Self { slack_m: path_m, per_m: 1.0, per_radian_m: greater(scale(self), scale(other)) }
-    }
-
-    /// While the one that is good for the longer way lasts.
-    fn or(self, other: Self) -> Self {
-        if other.path_m() > self.path_m() { other } else { self }
-    }
-}
-
-fn least(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
 
 /// The most motion of any view between two frames; `None` where no verdict may last, as when
 /// there are more or fewer views.
