@@ -87,18 +87,32 @@ pub(crate) fn colons(text: &str) -> Option<Stamp> {
     of_day(digits(hour)?, digits(minute)?, seconds(second)?)
 }
 
-/// A date and time in UTC: `2024-07-15T09:00:00.5Z`, with `+02:00` for `Z`, a blank for `T`; without
-/// zone it is UTC.
+/// A date and time in UTC: `2024-07-15T09:00:00.5Z`, with `+02:00` or `UTC` for `Z`, a blank for
+/// `T`, strokes for the date's dashes; without zone it is UTC. Or `20240715T090000Z`. Flightradar24
+/// writes fractions behind the zone: `2020-01-26 17:37:27Z.466`.
 pub(crate) fn iso(text: &str) -> Option<Stamp> {
     let text = text.trim();
     let split = text.find(['T', 't', ' '])?;
     let (date, rest) = (&text[..split], text.get(split + 1..)?.trim());
-    let mut parts = date.splitn(3, '-').map(digits);
-    let day = days(parts.next()??, parts.next()??, parts.next()??)?;
+    let day = match (digits(date), date.len()) {
+        (Some(_), 8) => date_of([&date[..4], &date[4..6], &date[6..]])?,
+        _ => {
+            let mut parts = date.splitn(3, ['-', '/']);
+            date_of([parts.next()?, parts.next()?, parts.next()?])?
+        }
+    };
+    let rest = rest.strip_suffix("UTC").or(rest.strip_suffix("GMT")).unwrap_or(rest);
     let end = rest.find(['Z', 'z', '+', '-']).unwrap_or(rest.len());
     let (time, zone) = (rest[..end].trim(), &rest[end..]);
-    let stamp = colons(time)?;
+    let late = zone.strip_prefix("Z.").map(|fraction| format!("{time}.{fraction}"));
+    let (time, zone) = late.as_deref().map_or((time, zone), |time| (time, "Z"));
+    let stamp = colons(time).or_else(|| compact(time))?;
     Some(Stamp { ns: day * DAY_NS + stamp.ns - zone_ns(zone)?, is_leap: stamp.is_leap })
+}
+
+/// Year, month and day as figures.
+fn date_of([year, month, day]: [&str; 3]) -> Option<i64> {
+    days(digits(year)?, digits(month)?, digits(day)?)
 }
 
 fn zone_ns(zone: &str) -> Option<i64> {
@@ -181,11 +195,16 @@ mod tests {
             "2024-07-15 12:00:00",
             "2024-07-15T14:00:00.000+02:00",
             "2024-07-15T06:30-0530",
+            "2024/07/15 12:00:00 UTC",
+            "20240715T120000Z",
+            "2024-07-15 12:00:00Z.000",
         ] {
             assert_eq!(ns(text), Some(noon), "{text}");
         }
         assert_eq!(ns("2024-07-15T12:00:00.25Z"), Some(noon + SECOND_NS / 4));
-        for text in ["2024-07-15", "2024-07-15T25:00:00Z", "noon", "2024-07-15T12:00:61Z", "T"] {
+        for text in
+            ["2024-07-15", "2024-07-15T25:00:00Z", "noon", "2024-07-15T12:00:61Z", "T", "éT12:00"]
+        {
             assert_eq!(ns(text), None, "{text}");
         }
         assert_eq!(compact("090001.50").map(|s| s.ns), Some(32_401 * SECOND_NS + SECOND_NS / 2));

@@ -31,11 +31,17 @@ const NEAR_S: f64 = 0.25;
 /// An attitude of the file counts where at least so many fixes have one.
 const ATTITUDES_LEAST: f64 = 0.5;
 
+/// So many attitudes that all have one pitch and one roll, over such a climb, are none.
+const FROZEN_FIXES: usize = 30;
+const FROZEN_M: f64 = 50.0;
+
 /// A flight between its first and last fix.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Curve {
     /// What the file calls it; may be empty.
     pub name: String,
+    /// Whether the file says that this is no aircraft, but a ship, a vehicle, a weapon.
+    pub is_aside: bool,
     /// UTC of the first fix, since 1970, in nanoseconds.
     pub start_ns: i64,
     /// Fixes that it goes through.
@@ -81,9 +87,11 @@ impl Curve {
         };
         let swing_m = half_m.max(SWING_M);
         let lowest: Vec<f64> = heights_spline.values().iter().map(|[h]| h - swing_m).collect();
-        let names = usize::try_from(fixes.track[rows[0]]).unwrap_or(0);
+        let track = fixes.track[rows[0]];
+        let names = usize::try_from(track).unwrap_or(0);
         let mut curve = Self {
             name: fixes.names.get(names).cloned().unwrap_or_default(),
+            is_aside: fixes.asides.contains(&track),
             start_ns,
             fixes: rows.len(),
             lines: [fixes.line[rows[0]], fixes.line[rows[rows.len() - 1]]],
@@ -101,9 +109,17 @@ impl Curve {
         let known: Vec<usize> =
             (0..rows.len()).filter(|&i| fixes.attitude_rad[rows[i]][0].is_finite()).collect();
         let zero = |&i: &usize| fixes.attitude_rad[rows[i]] == [0.0; 3];
+        let tilt = |&i: &usize| [fixes.attitude_rad[rows[i]][1], fixes.attitude_rad[rows[i]][2]];
+        let climb_m = {
+            let heights = || heights.height_m.iter().copied();
+            heights().fold(f64::MIN, f64::max) - heights().fold(f64::MAX, f64::min)
+        };
+        let is_frozen = known.len() >= FROZEN_FIXES
+            && climb_m > FROZEN_M
+            && known.windows(2).all(|pair| tilt(&pair[0]) == tilt(&pair[1]));
         let is_known = known.len() as f64 >= ATTITUDES_LEAST * rows.len() as f64;
-        // Writers that know no attitude fill in zeros.
-        if known.len() > 1 && is_known && !known.iter().all(zero) {
+        // Writers that know no attitude fill in zeros, or one pitch and roll throughout.
+        if known.len() > 1 && is_known && !is_frozen && !known.iter().all(zero) {
             curve.take_attitudes(fixes, rows, &known);
         } else {
             curve.estimate_attitudes();

@@ -83,6 +83,11 @@ pub enum TrackError {
         /// Why.
         why: String,
     },
+    /// A gzip file that cannot be read.
+    Gzip {
+        /// Why.
+        why: String,
+    },
     /// A column map that cannot be used.
     Columns {
         /// Why, with line and column of the map.
@@ -120,6 +125,7 @@ impl fmt::Display for TrackError {
                 write!(f, "{what} is larger than {limit} bytes, which is what is allowed")
             }
             Self::Zip { why } => write!(f, "zip archive: {why}"),
+            Self::Gzip { why } => write!(f, "gzip: {why}"),
             Self::Columns { why } => write!(f, "column map: {why}"),
             Self::Empty { format, why } => write!(f, "{}: {why}", format.name()),
             Self::Datum { format, why } => write!(

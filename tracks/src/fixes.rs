@@ -10,6 +10,7 @@ use crate::format::Format;
 use crate::grain::Grain;
 use crate::text::Text;
 use core::ops::RangeInclusive;
+use std::collections::BTreeSet;
 
 /// Most fixes of a file: a month at 10 Hz.
 const FIXES_MAX: usize = 30_000_000;
@@ -80,6 +81,8 @@ pub struct Fixes {
     pub track: Vec<u32>,
     /// What each recording is called; empty where nothing says.
     pub names: Vec<String>,
+    /// Recordings that the file says are of no aircraft, but of ships, vehicles, weapons.
+    pub asides: BTreeSet<u32>,
     /// UTC since 1970 in nanoseconds, leap seconds of the recording included; where no date is
     /// known, since the midnight before or the start.
     pub time_ns: Vec<i64>,
@@ -105,6 +108,8 @@ pub struct Fixes {
     pub steps: Steps,
     /// Records without position: not a fault.
     pub without_position: usize,
+    /// What one should know of it besides; and the line that it is about.
+    pub remark: Option<(String, u32)>,
     /// The first few faults; their records are left out.
     pub faults: Vec<Fault>,
     /// How many faults there are.
@@ -170,6 +175,7 @@ impl<'a> Sink<'a> {
             format,
             track: Vec::new(),
             names: Vec::new(),
+            asides: BTreeSet::new(),
             time_ns: Vec::new(),
             lat_rad: Vec::new(),
             lon_rad: Vec::new(),
@@ -180,6 +186,7 @@ impl<'a> Sink<'a> {
             line: Vec::new(),
             said: Said::Unknown("nothing says what heights are above".into()),
             zero_is_none: false,
+            remark: None,
             steps: Steps::default(),
             without_position: 0,
             faults: Vec::new(),

@@ -2,8 +2,9 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`format`](mod@format) | which format a file is in |
-//! | `formats` | IGC, GPX, KML, X-Plane, Tacview, NMEA, tables, JSON: from text to columns |
+//! | `unpack` | from bytes to text: out of archives, out of UTF-16 |
+//! | [`format`](mod@format) | which format a text is in |
+//! | `formats` | IGC, GPX, KML, X-Plane, Tacview, NMEA, ADS-B, tables: from text to columns |
 //! | [`columns`] | which column of a table is what |
 //! | [`fixes`] | the columns that all formats become |
 //! | [`clean`] | times that go forwards, places that can be flown between; notes on the rest |
@@ -32,6 +33,7 @@ mod formats;
 mod grain;
 mod spline;
 mod text;
+mod unpack;
 
 pub use clean::Note;
 pub use columns::ColumnMap;
@@ -85,11 +87,13 @@ pub struct Import {
 }
 
 impl Import {
-    /// The longest flight in time, of those that are as long the first; its number from 0.
+    /// The longest flight in time, of an aircraft if there is one; of those that are as long the
+    /// first; its number from 0.
     pub fn longest(&self) -> usize {
+        let rank = |flight: &Curve| (!flight.is_aside, flight.duration_s());
         let mut best = 0;
         for (i, flight) in self.flights.iter().enumerate() {
-            if flight.duration_s() > self.flights[best].duration_s() {
+            if rank(flight) > rank(&self.flights[best]) {
                 best = i;
             }
         }
@@ -102,7 +106,7 @@ impl Import {
 /// # Errors
 /// A file in no known format, too large, or with faults in more than a tenth of its records.
 pub fn read(bytes: &[u8], file: &str, options: &Options) -> Result<Fixes, TrackError> {
-    let whole = format::text_of(bytes, options.bytes_max)?;
+    let whole = unpack::text_of(bytes, options.bytes_max)?;
     let text = Text::new(&whole);
     let format = match &options.columns {
         Some(_) => Some(Format::MappedCsv),
@@ -120,6 +124,7 @@ pub fn read(bytes: &[u8], file: &str, options: &Options) -> Result<Fixes, TrackE
         Format::Fdr => formats::fdr::read(&mut sink),
         Format::Acmi => formats::acmi::read(&mut sink),
         Format::Nmea => formats::nmea::read(&mut sink),
+        Format::BaseStation => formats::basestation::read(&mut sink),
         Format::AdsbJson => formats::json::read(&mut sink),
         Format::FlightGear | Format::AdsbCsv | Format::Csv | Format::MappedCsv => {
             formats::table::read(&mut sink, options.columns.as_ref())
@@ -139,12 +144,16 @@ pub fn import(
     undulation_m: Undulation<'_>,
 ) -> Result<Import, TrackError> {
     let mut fixes = read(bytes, file, options)?;
-    if fixes.format == Format::Acmi {
-        // Tacview's frames may be out of order.
+    if let Format::Acmi | Format::AdsbCsv | Format::AdsbJson | Format::BaseStation = fixes.format {
+        // Tacview's frames may be out of order, and so are places by way of several receivers;
+        // Flightradar24 and databases begin with the last.
         sort_by_time(&mut fixes);
     }
     let heights = datum::resolve(&fixes, options.altitude, undulation_m)?;
     let (stretches, mut notes) = clean::clean(&fixes, options.gap_s);
+    if let Some((what, line)) = fixes.remark.take() {
+        notes.insert(0, Note { what, count: 0, line });
+    }
     let mut flights = Vec::new();
     let (mut spikes, mut bare) = (0, 0);
     for rows in &stretches {

@@ -16,12 +16,22 @@ use std::collections::BTreeMap;
 /// Most seconds of a frame: a year.
 const FRAME_S: f64 = 31_536_000.0;
 
-/// What is known of an object: places are written only as far as they change.
-#[derive(Clone, Copy)]
+/// What is known of an object: places are written only as far as they change, names and types once,
+/// with the first place or before.
 struct Object {
-    track: u32,
+    /// Its recording, from its first place on.
+    track: Option<u32>,
+    name: Option<String>,
+    /// Whether its type says that it is no aircraft.
+    is_aside: bool,
     /// Longitude, latitude (with the reference's added), metres, roll, pitch, yaw.
     place: [f64; 6],
+}
+
+impl Default for Object {
+    fn default() -> Self {
+        Self { track: None, name: None, is_aside: false, place: [f64::NAN; 6] }
+    }
 }
 
 #[derive(Default)]
@@ -37,6 +47,13 @@ struct Scene {
 pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     let mut scene = Scene::default();
     sink.fixes.said = Said::Declared(Datum::Msl, "Tacview's files are by definition".into());
+    let version = sink.text.lines().find_map(|line| line.trim().strip_prefix("FileVersion="));
+    if let Some(version) = version.filter(|version| version.starts_with("1.")) {
+        let at = sink.text.offset(version);
+        let wrong =
+            Wrong::new(at, "FileVersion", version, "2.0 to 2.2; Tacview saves older ones anew");
+        return Err(TrackError::Fault(sink.text.fault(wrong)));
+    }
     // A backslash at the end of a line goes on with the value: such lines hold no place.
     let mut continues = false;
     for line in sink.text.lines() {
@@ -77,27 +94,34 @@ fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<F
         let wrong = || Wrong::new(at, "object", id, "a hexadecimal number");
         return if is_comment { Ok(None) } else { Err(wrong()) };
     };
+    if id == 0 {
+        let mut pairs = parts.filter_map(|part| part.split_once('='));
+        return pairs.try_for_each(|(key, value)| global(sink, scene, key, value)).map(|()| None);
+    }
+    let object = scene.objects.entry(id).or_default();
     let mut place = None;
-    let mut name = None;
     for part in parts {
         match part.split_once('=') {
             Some(("T", value)) => place = Some(value),
-            Some(("Name" | "CallSign" | "Pilot", value)) if name.is_none() => name = Some(value),
-            Some((key, value)) if id == 0 => global(sink, scene, key, value)?,
+            Some(("Name" | "CallSign" | "Pilot", value)) if object.name.is_none() => {
+                object.name = Some(value.replace("\\,", ","));
+            }
+            Some(("Type", value)) => object.is_aside = !value.starts_with("Air"),
             _ => {}
         }
     }
     let Some(place) = place else { return Ok(None) };
-    let object = scene.objects.get(&id).copied().unwrap_or_else(|| {
+    let track = *object.track.get_or_insert_with(|| {
         let track = u32::try_from(sink.fixes.names.len()).unwrap_or(u32::MAX);
-        sink.fixes.names.push(name.map_or_else(|| format!("{id:x}"), str::to_owned));
-        let none = f64::NAN;
-        Object { track, place: [none; 6] }
+        sink.fixes.names.push(object.name.clone().unwrap_or_else(|| format!("{id:x}")));
+        track
     });
-    let object = placed(sink, scene, object, place)?;
-    scene.objects.insert(id, object);
-    let mut fix = Fix::new(object.track, scene.start_ns + scene.frame_ns, at);
+    if object.is_aside {
+        sink.fixes.asides.insert(track);
+    }
+    object.place = placed(sink, scene.reference_deg, object.place, place)?;
     let [lon, lat, height, roll, pitch, yaw] = object.place;
+    let mut fix = Fix::new(track, scene.start_ns + scene.frame_ns, at);
     if !(lon.is_finite() && lat.is_finite()) {
         sink.fixes.without_position += 1;
         return Ok(None);
@@ -123,13 +147,13 @@ fn global(sink: &Sink<'_>, scene: &mut Scene, key: &str, value: &str) -> Result<
     Ok(())
 }
 
-/// The object with the parts of its place that a `T=` has.
+/// The place with the parts of it that a `T=` has.
 fn placed(
     sink: &mut Sink<'_>,
-    scene: &Scene,
-    mut object: Object,
+    reference_deg: [f64; 2],
+    mut place: [f64; 6],
     text: &str,
-) -> Result<Object, Wrong> {
+) -> Result<[f64; 6], Wrong> {
     let parts: Vec<&str> = text.split('|').collect();
     let columns: &[usize] = match parts.len() {
         3 | 5 => &[0, 1, 2],
@@ -146,9 +170,9 @@ fn placed(
             continue;
         }
         let value = match column {
-            0 => sink.lon_offset(part, at)? + scene.reference_deg[0],
+            0 => sink.lon_offset(part, at)? + reference_deg[0],
             1 => {
-                let sum = sink.lat_offset(part, at)? + scene.reference_deg[1];
+                let sum = sink.lat_offset(part, at)? + reference_deg[1];
                 if sum.abs() > 90.0 {
                     return Err(Wrong::new(at, "latitude", part, "-90 to 90 with the reference's"));
                 }
@@ -157,9 +181,9 @@ fn placed(
             2 => sink.height_at(part, at)?,
             _ => sink.angle_at(["roll", "pitch", "yaw"][column - 3], part, at)?,
         };
-        object.place[column] = value;
+        place[column] = value;
     }
-    Ok(object)
+    Ok(place)
 }
 
 /// The parts between commas that no backslash stands before.

@@ -6,6 +6,7 @@
 //! Not here: which format it is (`format`), what becomes of the fixes (`clean`, `datum`).
 
 pub(crate) mod acmi;
+pub(crate) mod basestation;
 pub(crate) mod fdr;
 pub(crate) mod gpx;
 pub(crate) mod igc;
