@@ -1,14 +1,24 @@
-//! X-Plane's flight data recorder files, versions 3 and 4.
+//! X-Plane's flight data recorder files, versions 1 to 4.
 //!
 //! In:    the text of a file.
 //! Out:   a fix with attitude for each row of data.
 //! Keeps: nothing.
-//! Not here: instruments; `CALI`, which lifts X-Plane's replay to its scenery.
-//! Source: Laminar Research, "Creating FDR files", and the example that comes with X-Plane.
+//! Not here: instruments; weather (`PRES` is no setting of the altitudes, which are true ones);
+//! `CALI`, which lifts X-Plane's replay to its scenery.
+//! Source: Laminar Research, "Creating FDR files", x-plane.com, for the kinds of lines and versions 1
+//! and 2; the examples for versions 3 and 4 that come with X-Plane 12, whose order of fields public
+//! tests of the Python package `xpwebapi` and public converters agree about.
 //!
-//! By hand: no crate reads it. Rows of version 4 are `time, longitude, latitude, feet, heading,
-//! pitch, roll`; those of version 3 are `DATA, seconds, temperature, longitude, latitude, feet,
-//! radio altitude, aileron, elevator, rudder, pitch, roll, heading` and some 70 more.
+//! By hand: no crate reads it. There are three kinds of rows:
+//!
+//! | version | row |
+//! |---|---|
+//! | 1, 2 | `DATA, seconds, temperature, longitude, latitude, feet, radio altitude, aileron, elevator, rudder, pitch, roll, heading` and some 65 more |
+//! | 3 | `DATA, seconds, longitude, latitude, feet, heading, pitch, roll`, then what `DREF` lines say |
+//! | 4 | `time, longitude, latitude, feet, heading, pitch, roll`, then what `DREF` lines say |
+//!
+//! Where a version 3 says nothing of `DREF`s and has rows as long as those of versions 1 and 2, it is
+//! one of these by another name.
 
 use crate::clock::{self, Clock, DAY_NS, SECOND_NS};
 use crate::fault::{TrackError, Wrong};
@@ -16,7 +26,11 @@ use crate::fixes::{Datum, FOOT_M, Fix, Said, Sink};
 
 /// Fields of longitude, latitude, feet, heading, pitch and roll.
 const NEW: [usize; 6] = [1, 2, 3, 4, 5, 6];
+const DATA: [usize; 6] = [2, 3, 4, 5, 6, 7];
 const OLD: [usize; 6] = [3, 4, 5, 12, 10, 11];
+/// Rows of versions 1 and 2 have more fields than this; those of version 3 have seven, and one for
+/// each `DREF`.
+const OLD_FIELDS: usize = 40;
 
 /// What a row's time counts from.
 #[derive(Default)]
@@ -30,11 +44,15 @@ pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     sink.height_unit_m = FOOT_M;
     let why = "X-Plane's files are by definition";
     sink.fixes.said = Said::Declared(Datum::Msl, why.into());
+    let version = sink.text.lines().filter(|line| !line.trim().is_empty()).nth(1).unwrap_or("");
+    let is_new = version.trim_start().starts_with(['3', '4']);
+    let mut has_drefs = false;
     for line in sink.text.lines() {
         // Comments may follow what counts.
         let line = line.split("//").next().unwrap_or("");
         let fields: Vec<&str> = line.split(',').collect();
         let kind = fields[0].trim();
+        has_drefs |= kind == "DREF";
         let done = match kind {
             "DATE" => date(sink, &fields).map(|day| {
                 start.day = day;
@@ -45,14 +63,23 @@ pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
                 start.tod_ns = stamp.ns;
                 None
             }),
-            "DATA" => seconds(sink, &fields, &start)
-                .and_then(|time_ns| fix(sink, &fields, OLD, time_ns).map(Some)),
+            "DATA" => {
+                let is_old = !is_new || (!has_drefs && fields.len() > OLD_FIELDS);
+                let columns = if is_old { OLD } else { DATA };
+                seconds(sink, &fields, &start)
+                    .and_then(|time_ns| fix(sink, &fields, columns, time_ns).map(Some))
+            }
             _ if kind.starts_with(|c: char| c.is_ascii_digit()) && fields.len() > 1 => {
                 time(sink, fields[0])
                     .and_then(|stamp| fix(sink, &fields, NEW, clock.of_day(stamp)).map(Some))
             }
             _ => continue,
         };
+        if sink.fixes.remark.is_none() && !matches!(kind, "DATE" | "TIME") && is_new {
+            let line = sink.text.line(sink.text.offset(fields[0]));
+            let what = "headings are magnetic by X-Plane's definition, and are taken as true ones";
+            sink.fixes.remark = Some((what.into(), line));
+        }
         match done {
             Ok(found) => found.map_or(Ok(()), |fix| sink.push(fix))?,
             Err(wrong) => sink.bad(wrong),

@@ -86,13 +86,25 @@ pub fn fdr_4() -> String {
     text("A\n4\n\nACFT, a.acf\nTAIL, N1\nDATE, 07/15/2024\n\n", row, "")
 }
 
+pub fn fdr_1() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let feet = height / 0.3048;
+        let rest = "0,".repeat(65);
+        format!("DATA,{second},15,{lon:.7},{lat:.7},{feet:.2},500,0,0,0,3,0,340,{rest}\r")
+    };
+    text("A\r1\rTAIL,N1,\rTIME,09:00:00,\rDATE,07/15/24,\rCALI,11.25,46.5,6500,\r", row, "")
+}
+
 pub fn fdr_3() -> String {
     let row = |second| {
         let (lat, lon, height) = place(second);
         let feet = height / 0.3048;
-        format!("DATA,{second},15,{lon:.7},{lat:.7},{feet:.2},500,0,0,0,3,0,340,90,0,0,\r")
+        format!("DATA,{second},{lon:.7},{lat:.7},{feet:.2},340,3,0,29.92,6500\r\n")
     };
-    text("I\r3\rCOMM,old\rTIME,09:00:00\rDATE,07/15/24\r", row, "")
+    let head = "I\r\n3 and some words about it\r\nCOMM,x\r\nTIME,09:00:00\r\nDATE,07/15/24\r\n\
+                DREF,sim/some/thing\t1.0\t// that\r\nDREF,sim/other\t0.5\r\n";
+    text(head, row, "")
 }
 
 pub fn acmi() -> String {
@@ -166,6 +178,154 @@ pub fn trace_json() -> String {
     text("{\"icao\":\"3c6444\",\"timestamp\":1721034000.0,\"trace\":[", row, "\n]}\n")
 }
 
+pub fn base_station() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let time = format!("2024/07/15,09:00:{second:02}.000");
+        let line = |kind, rest| format!("MSG,{kind},1,1,3C6444,1,{time},{time},{rest}\n");
+        line(1, "DLH1,,,,,,,,0,,0,0".to_owned())
+            + &line(3, format!(",{:.0},,,{lat:.5},{lon:.5},,,0,0,0,0", height / 0.3048))
+            + &line(4, ",,55,340,,,600,,0,0,0,0".to_owned())
+    };
+    text("STA,,5,1,3C6444,1,2024/07/15,09:00:00.000,2024/07/15,09:00:00.000,OK\n", row, "")
+}
+
+/// readsb's `aircraft.json`, one a second: places are 1.5 s old.
+pub fn snapshots() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        format!(
+            "{{\"now\":{:.1},\"messages\":1,\"aircraft\":[{{\"hex\":\"3c6444\",\"alt_baro\":{:.0},\
+             \"lat\":{lat:.6},\"lon\":{lon:.6},\"seen_pos\":1.5}},{{\"hex\":\"4ca2d6\",\"seen\":3}}]}}\n",
+            1_721_034_001.5 + f64::from(second),
+            height / 0.3048
+        )
+    };
+    text("", row, "")
+}
+
+/// OpenSky's states, one answer a second: the place is that of the time before it.
+pub fn states() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let at = 1_721_034_000 + second;
+        format!(
+            "{{\"time\":{},\"states\":[[\"3c6444\",\"DLH1\",\"Germany\",{at},{at},{lon:.5},{lat:.5},\
+             {height:.1},false,50,340,3,null,null,\"1000\",false,0]]}}\n",
+            at + 4
+        )
+    };
+    text("", row, "")
+}
+
+/// A table as pandas writes it: columns of rows by number.
+pub fn columns_json() -> String {
+    let column = |name: &str, value: &dyn Fn(u32) -> String| {
+        let rows: Vec<_> = (0..SECONDS).map(|i| format!("\"{i}\":{}", value(i))).collect();
+        format!("\"{name}\":{{{}}}", rows.join(","))
+    };
+    let columns = [
+        column("timestamp", &|i| (1_721_034_000_000 + 1000 * u64::from(i)).to_string()),
+        column("icao24", &|_| "\"3c6444\"".to_owned()),
+        column("latitude", &|i| format!("{:.6}", place(i).0)),
+        column("longitude", &|i| format!("{:.6}", place(i).1)),
+        column("altitude", &|i| format!("{:.1}", place(i).2 / 0.3048)),
+    ];
+    format!("{{{}}}\n", columns.join(","))
+}
+
+/// A line with its times beside it, as programs for competitions take it.
+pub fn gps_dump() -> String {
+    let seconds: String = (0..SECONDS).map(|second| format!("{second} ")).collect();
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        format!("{lon:.6},{lat:.6},{height:.0} ")
+    };
+    let head = format!(
+        "<kml><Folder><Placemark><Metadata src=\"x\" type=\"track\">\n\
+         <FsInfo time_of_first_point=\"2024-07-15T09:00:00Z\"><SecondsFromTimeOfFirstPoint>\n\
+         {seconds}</SecondsFromTimeOfFirstPoint></FsInfo></Metadata><LineString>\n\
+         <altitudeMode>absolute</altitudeMode><coordinates>\n"
+    );
+    text(&head, row, "</coordinates></LineString></Placemark></Folder></kml>\n")
+}
+
+/// A track whose angles stand in arrays of their own, and views and lines that mean the ground.
+pub fn arrays_kml() -> String {
+    let array = |name: &str, value: &str| {
+        let values = format!("<gx:value>{value}</gx:value>").repeat(12);
+        format!("<gx:SimpleArrayData name=\"{name}\">{values}</gx:SimpleArrayData>\n")
+    };
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        format!(
+            "<when>2024-07-15T09:00:{second:02}.000Z</when>\n\
+             <gx:coord>{lon:.6} {lat:.6} {height:.1}</gx:coord>\n"
+        )
+    };
+    let head = "<kml><Placemark><LineString><altitudeMode>clampToGround</altitudeMode>\n\
+                <coordinates>11,46,0 11,47,0</coordinates></LineString></Placemark>\n\
+                <Placemark><LookAt><gx:TimeStamp><when>2024-07-15</when></gx:TimeStamp>\n\
+                <altitudeMode>relativeToGround</altitudeMode></LookAt><gx:MultiTrack>\n\
+                <altitudeMode>absolute</altitudeMode><gx:Track>\n";
+    let arrays = array("course", "340") + &array("pitch", "3") + &array("bank", "-7");
+    let tail = "</gx:Track></gx:MultiTrack></Placemark></kml>\n";
+    text(head, row, &(arrays + tail))
+}
+
+/// Titles of the flight come first, then those of the fixes.
+pub fn foreflight() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let feet = height / 0.3048;
+        format!("1.7210340{second:02}000E9,{lat:.9},{lon:.9},{feet:.4},340.0,97.2,-7.0,3.0,2.0\n")
+    };
+    let head = "Pilot,Tail Number,Start Latitude,Start Time,Battery State\n\
+                \"\",\"N1\",46.5,1721034000000,\"iOS\"\n\
+                Timestamp,Latitude,Longitude,Altitude,Course,Speed,Bank,Pitch,Vertical Error\n";
+    text(head, row, "")
+}
+
+/// Garmin's G1000: date, time and zone apart, units above the titles.
+pub fn g1000() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let feet = height / 0.3048;
+        format!(
+            "2024-07-15, 11:00:{second:02},  +02:00, {lat:12.7}, {lon:12.7}, 6543.2, {feet:7.1}, 3\r\n"
+        )
+    };
+    let head = "#airframe_info, log_version=\"1.00\"\r\n\
+                #yyy-mm-dd, hh:mm:ss, hh:mm, degrees, degrees, ft Baro, ft msl, deg\r\n  \
+                Lcl Date, Lcl Time, UTCOfst, Latitude, Longitude, AltB, AltMSL, Pitch\r\n        \
+                , , , , , , ,\r\n";
+    text(head, row, "")
+}
+
+pub fn semicolons() -> String {
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        format!("2024-07-15 09:00:{second:02};{lat:.6};{lon:.6};{height:.1}\n").replace('.', ",")
+    };
+    text("utc;lat_deg;lon_deg;alt_msl_m\n", row, "")
+}
+
+/// Positions without heights, and the pressure altitude that an instrument says beside them; with
+/// the times of a terminal.
+pub fn terminal() -> String {
+    let sentence = |second: u32, body: String| {
+        let sum = body.bytes().fold(0_u8, |sum, byte| sum ^ byte);
+        format!("[11:00:{second:02}.123] ${body}*{sum:02X}\n")
+    };
+    let row = |second| {
+        let (lat, lon, height) = place(second);
+        let (lat, lon) = (minutes(lat, 2, 5), minutes(lon, 3, 5));
+        let rmc = format!("GNRMC,0900{second:02}.00,A,{lat},N,{lon},E,50.0,340.0,150724,,");
+        sentence(second, rmc) + &sentence(second, format!("PGRMZ,{:.0},f,3", height / 0.3048))
+    };
+    text("", row, "")
+}
+
 pub fn own_csv() -> String {
     let row = |second| {
         let (lat, lon, height) = place(second);
@@ -202,6 +362,19 @@ pub fn zipped(name: &str, text: &str) -> Vec<u8> {
     writer.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
     std::io::Write::write_all(&mut writer, text.as_bytes()).unwrap();
     writer.finish().unwrap().into_inner()
+}
+
+/// The bytes as a gzip file.
+pub fn gzipped(bytes: &[u8]) -> Vec<u8> {
+    let mut writer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut writer, bytes).unwrap();
+    writer.finish().unwrap()
+}
+
+/// A text as UTF-16, its low bytes first, with a mark of their order or without.
+pub fn utf_16(text: &str, mark: &str) -> Vec<u8> {
+    let units = mark.encode_utf16().chain(text.encode_utf16());
+    units.flat_map(u16::to_le_bytes).collect()
 }
 
 /// A copy of a text with one line changed; lines count from 1.
