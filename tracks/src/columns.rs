@@ -85,6 +85,15 @@ pub struct TimeColumn {
     /// How they are written.
     #[serde(default)]
     pub unit: TimeUnit,
+    /// The column of dates, where they stand apart: `YYYY-MM-DD`.
+    #[serde(default)]
+    pub date: Option<Key>,
+    /// The column of zones, where they stand apart: `+02:00`, ahead of UTC.
+    #[serde(default)]
+    pub zone: Option<Key>,
+    /// The column of when the place was measured, where that is not when the row was written.
+    #[serde(default)]
+    pub measured: Option<Key>,
 }
 
 /// A column of heights.
@@ -168,7 +177,7 @@ impl ColumnMap {
 }
 
 /// What is known of titles: the role, the spellings in order of preference.
-const TIMES: [&str; 11] = [
+const TIMES: [&str; 15] = [
     "utc",
     "time_utc",
     "timestamp",
@@ -180,10 +189,21 @@ const TIMES: [&str; 11] = [
     "datetime",
     "date_time",
     "/sim/time/elapsed-sec",
+    "time (s)",
+    "utc time",
+    "time (utc)",
+    "lcl time",
 ];
-const LATS: [&str; 6] =
-    ["lat_deg", "latitude-deg", "latitude_deg", "latitude", "lat", "/position/latitude-deg"];
-const LONS: [&str; 7] = [
+const LATS: [&str; 7] = [
+    "lat_deg",
+    "latitude-deg",
+    "latitude_deg",
+    "latitude",
+    "lat",
+    "/position/latitude-deg",
+    "latitude (deg)",
+];
+const LONS: [&str; 8] = [
     "lon_deg",
     "longitude-deg",
     "longitude_deg",
@@ -191,11 +211,15 @@ const LONS: [&str; 7] = [
     "lon",
     "lng",
     "/position/longitude-deg",
+    "longitude (deg)",
 ];
 const IDS: [&str; 4] = ["icao24", "hex", "flight_id", "id"];
 const HEADINGS: [&str; 4] = ["heading_deg", "heading-deg", "yaw_deg", "/orientation/heading-deg"];
 const PITCHES: [&str; 3] = ["pitch_deg", "pitch-deg", "/orientation/pitch-deg"];
 const ROLLS: [&str; 3] = ["roll_deg", "roll-deg", "/orientation/roll-deg"];
+
+/// When a place was measured; OpenSky's states and the traffic library repeat it until the next.
+const MEASURED: [&str; 2] = ["lastposupdate", "last_position"];
 
 type Height = (&'static str, LengthUnit, Option<RawDatum>, Format);
 
@@ -203,7 +227,7 @@ use LengthUnit::{Feet, Metres};
 use RawDatum::{Ellipsoid, Msl};
 
 /// Heights by title, and which kind of table has such. ADS-B's are apart.
-const HEIGHTS: [Height; 13] = [
+const HEIGHTS: [Height; 18] = [
     ("alt_msl_m", Metres, Some(Msl), Format::Csv),
     ("altitude_msl_m", Metres, Some(Msl), Format::Csv),
     ("alt_ellipsoid_m", Metres, Some(Ellipsoid), Format::Csv),
@@ -217,6 +241,12 @@ const HEIGHTS: [Height; 13] = [
     ("alt_m", Metres, None, Format::Csv),
     ("alt_ft", Feet, None, Format::Csv),
     ("height_m", Metres, None, Format::Csv),
+    // Garmin's G1000 and what imitates it.
+    ("altmsl", Feet, Some(Msl), Format::Csv),
+    ("altitude_feet", Feet, None, Format::Csv),
+    ("altitude_meters", Metres, None, Format::Csv),
+    ("altitude (ft)", Feet, None, Format::Csv),
+    ("altitude (m)", Metres, None, Format::Csv),
 ];
 
 /// The map of a table with these titles, and which kind it is; else which title is missing.
@@ -231,7 +261,13 @@ pub(crate) fn known(titles: &[String], separator: char) -> Result<(ColumnMap, Fo
             format!("a column of {what}, such as {some}; or a column map")
         })
     };
-    let time = TimeColumn { column: needed("times", &TIMES)?, unit: TimeUnit::Auto };
+    let time = TimeColumn {
+        column: needed("times", &TIMES)?,
+        unit: TimeUnit::Auto,
+        date: find(&["lcl date"]),
+        zone: find(&["utcofst"]),
+        measured: find(&MEASURED),
+    };
     // Flightradar24 writes both in one column, between quotes.
     let (latitude, longitude) = match find(&["position"]).filter(|_| find(&LATS).is_none()) {
         Some(both) => (both.clone(), both),
@@ -242,7 +278,12 @@ pub(crate) fn known(titles: &[String], separator: char) -> Result<(ColumnMap, Fo
             .to_owned()
     })?;
     let is_adsb = format == Format::AdsbCsv;
-    let attitude = |names: &[&str]| if is_adsb { None } else { find(names) };
+    let is_foreflight = has_foreflight(titles);
+    let attitude = |names: &[&str], theirs: &str| match () {
+        () if is_adsb => None,
+        () if is_foreflight => Some(Key::Title(theirs.to_owned())),
+        () => find(names),
+    };
     let map = ColumnMap {
         separator,
         titles: true,
@@ -251,13 +292,19 @@ pub(crate) fn known(titles: &[String], separator: char) -> Result<(ColumnMap, Fo
         longitude,
         altitude,
         pressure,
-        heading: attitude(&HEADINGS),
-        pitch: attitude(&PITCHES),
-        roll: attitude(&ROLLS),
+        heading: attitude(&HEADINGS, "course"),
+        pitch: attitude(&PITCHES, "pitch"),
+        roll: attitude(&ROLLS, "bank"),
         id: find(&IDS),
         angles: AngleUnit::Degrees,
     };
     Ok((map, format))
+}
+
+/// `ForeFlight`'s tracks: feet above sea level; courses over ground stand for headings.
+fn has_foreflight(titles: &[String]) -> bool {
+    let has = |name: &&str| titles.iter().any(|title| title == name);
+    ["timestamp", "altitude", "course", "bank", "pitch"].iter().all(has)
 }
 
 /// Columns of heights and of pressure altitudes. OpenSky writes metres, the traffic library feet.
@@ -267,6 +314,9 @@ fn heights(titles: &[String]) -> Option<(HeightColumn, Option<HeightColumn>, For
         |name: &str, unit, datum| HeightColumn { column: Key::Title(name.to_owned()), unit, datum };
     if let Some((name, unit, datum, format)) = HEIGHTS.into_iter().find(|(name, ..)| has(name)) {
         return Some((column(name, unit, datum), None, format));
+    }
+    if has_foreflight(titles) {
+        return Some((column("altitude", Feet, Some(Msl)), None, Format::Csv));
     }
     let (pressure, unit) = match () {
         () if has("baroaltitude") => ("baroaltitude", Metres),

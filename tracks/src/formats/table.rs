@@ -13,12 +13,18 @@ use crate::columns::{AngleUnit, ColumnMap, HeightColumn, Key, LengthUnit, TimeUn
 use crate::fault::{TrackError, Wrong};
 use crate::fixes::{DEGREE_RAD, Datum, FOOT_M, Fix, Said, Sink, number_at};
 use crate::format::Format;
-use csv::{ReaderBuilder, StringRecord};
+use csv::{Reader, ReaderBuilder, StringRecord};
 use std::collections::BTreeMap;
+
+/// Rows that are looked at for titles.
+const TITLE_ROWS: usize = 10;
 
 /// Numbers of the columns, from 0.
 struct Places {
     time: usize,
+    date: Option<usize>,
+    zone: Option<usize>,
+    measured: Option<usize>,
     lat: usize,
     lon: usize,
     height: usize,
@@ -30,37 +36,34 @@ struct Places {
 }
 
 pub(crate) fn read(sink: &mut Sink<'_>, map: Option<&ColumnMap>) -> Result<(), TrackError> {
-    let separator = map.map_or_else(|| separator_of(sink.text.all), |map| map.separator);
-    let mut builder = ReaderBuilder::new();
-    let byte = u8::try_from(separator).unwrap_or(b',');
-    builder.delimiter(byte).has_headers(false).flexible(true);
-    let mut reader = builder.from_reader(sink.text.all.as_bytes());
-    let mut record = StringRecord::new();
-    let mut titles = Vec::new();
-    let mut first_at = 0;
-    if map.is_none_or(|map| map.titles) {
-        // What is text already is UTF-8, and rows may have any length: this cannot fail.
-        let _ = reader.read_record(&mut record);
-        titles = record.iter().map(|title| title.trim().to_ascii_lowercase()).collect();
-        first_at = usize::try_from(record.position().map_or(0, csv::Position::byte)).unwrap_or(0);
-    }
-    let (map, format) = match map {
-        Some(map) => (map.clone(), Format::MappedCsv),
-        None => known(&titles, separator).map_err(|expected| {
-            let found = record.iter().collect::<Vec<_>>().join(",");
-            TrackError::Fault(sink.text.fault(Wrong::new(first_at, "title", &found, expected)))
-        })?,
+    let layout = match map {
+        Some(map) => Layout::mapped(sink, map),
+        None => Layout::known(sink)?,
     };
+    let Layout { map, format, titles, from } = layout;
+    let mut reader = reader_of(&sink.text.all[from..], map.separator);
     sink.fixes.format = format;
     let places = places(&map, &titles)?;
     set_units(sink, &map);
     sink.fixes.said = said(&map.altitude, format);
     let mut tracks = BTreeMap::new();
     let mut clocks = Vec::new();
+    let mut record = StringRecord::new();
+    // What is text already is UTF-8, and rows may have any length: this cannot fail.
     while reader.read_record(&mut record).unwrap_or(false) {
         let at = usize::try_from(record.position().map_or(0, csv::Position::byte)).unwrap_or(0);
-        let row = Row { record: &record, at, separator: byte };
-        let id = places.id.and_then(|id| record.get(id)).unwrap_or("");
+        if record.iter().all(|field| field.trim().is_empty()) {
+            continue;
+        }
+        if map.separator == ';' {
+            record = with_points(&record);
+        }
+        // The crate counts a row from the end of the one before, of two bytes the second.
+        let at = from + at;
+        let ends = sink.text.all[at..].bytes().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+        let at = at + ends.count();
+        let row = Row { record: &record, at, separator: byte_of(map.separator) };
+        let id = places.id.and_then(|id| record.get(id)).unwrap_or("").trim();
         let track = *tracks.entry(id.to_owned()).or_insert_with(|| {
             sink.fixes.names.push(id.to_owned());
             clocks.push(Clock::default());
@@ -77,9 +80,77 @@ pub(crate) fn read(sink: &mut Sink<'_>, map: Option<&ColumnMap>) -> Result<(), T
     Ok(())
 }
 
-fn separator_of(text: &str) -> char {
-    let first = text.lines().next().unwrap_or("");
-    let count = |c: char| first.matches(c).count();
+/// The record with points for commas in numbers: half of Europe writes them so, and then separates
+/// fields by semicolons.
+fn with_points(record: &StringRecord) -> StringRecord {
+    let is_number = |text: &str| {
+        let figures = text.trim().trim_start_matches('-').bytes();
+        figures.clone().filter(|&byte| byte == b',').count() == 1
+            && figures.clone().all(|byte| byte == b',' || byte.is_ascii_digit())
+    };
+    let field = |text: &str| if is_number(text) { text.replace(',', ".") } else { text.to_owned() };
+    record.iter().map(field).collect()
+}
+
+/// What is in which column, and where the rows begin.
+struct Layout {
+    map: ColumnMap,
+    format: Format,
+    titles: Vec<String>,
+    from: usize,
+}
+
+impl Layout {
+    fn mapped(sink: &Sink<'_>, map: &ColumnMap) -> Self {
+        let all = sink.text.all;
+        let (titles, from) =
+            if map.titles { titles_of(all, map.separator) } else { (Vec::new(), 0) };
+        Self { map: map.clone(), format: Format::MappedCsv, titles, from }
+    }
+
+    /// The first row whose titles are known: `ForeFlight` and Garmin write others before.
+    fn known(sink: &Sink<'_>) -> Result<Self, TrackError> {
+        let all = sink.text.all;
+        let mut first = None;
+        for line in sink.text.lines().filter(|line| !line.trim().is_empty()).take(TITLE_ROWS) {
+            let at = sink.text.offset(line);
+            let separator = separator_of(line);
+            let (titles, rest) = titles_of(&all[at..], separator);
+            match known(&titles, separator) {
+                Ok((map, format)) => return Ok(Self { map, format, titles, from: at + rest }),
+                Err(expected) => {
+                    first.get_or_insert_with(|| Wrong::new(at, "title", line.trim(), expected));
+                }
+            }
+        }
+        let wrong = first.unwrap_or_else(|| Wrong::new(0, "title", "", "titles of columns"));
+        Err(TrackError::Fault(sink.text.fault(wrong)))
+    }
+}
+
+/// The titles of a text's first row, and where the next row begins.
+fn titles_of(text: &str, separator: char) -> (Vec<String>, usize) {
+    let mut reader = reader_of(text, separator);
+    let mut record = StringRecord::new();
+    let _ = reader.read_record(&mut record);
+    let titles = record.iter().map(|title| title.trim().to_ascii_lowercase()).collect();
+    let end = usize::try_from(reader.position().byte()).unwrap_or(0).min(text.len());
+    let ends = text[end..].bytes().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
+    (titles, end + ends)
+}
+
+fn reader_of(text: &str, separator: char) -> Reader<&[u8]> {
+    let mut builder = ReaderBuilder::new();
+    builder.delimiter(byte_of(separator)).has_headers(false).flexible(true);
+    builder.from_reader(text.as_bytes())
+}
+
+fn byte_of(separator: char) -> u8 {
+    u8::try_from(separator).unwrap_or(b',')
+}
+
+fn separator_of(line: &str) -> char {
+    let count = |c: char| line.matches(c).count();
     if count(';') > count(',') {
         ';'
     } else if count('\t') > count(',') {
@@ -109,6 +180,9 @@ fn places(map: &ColumnMap, titles: &[String]) -> Result<Places, TrackError> {
     };
     Ok(Places {
         time: place(&map.time.column)?,
+        date: some(&map.time.date)?,
+        zone: some(&map.time.zone)?,
+        measured: some(&map.time.measured)?,
         lat: place(&map.latitude)?,
         lon: place(&map.longitude)?,
         height: place(&map.altitude.column)?,
@@ -146,6 +220,9 @@ fn said(column: &HeightColumn, format: Format) -> Said {
         (Some(datum), Format::AdsbCsv) => {
             let why = format!("transponders send that, and here it is the column {title}");
             Said::Habit(datum, why)
+        }
+        (Some(datum), Format::Csv) if title == "altitude" => {
+            Said::Habit(datum, "ForeFlight's own altitude is".into())
         }
         (Some(datum), Format::MappedCsv) => Said::Declared(datum, "the column map says".into()),
         (Some(datum), _) => Said::Declared(datum, format!("the title {title} says")),
@@ -199,12 +276,10 @@ fn fix(
         (lat, lon) = lat.split_once(',').unwrap_or((lat, ""));
         lon_at += lat.len() + 1;
     }
-    let none = |text: &str| text.is_empty() || text.eq_ignore_ascii_case("nan") || text == "null";
     if none(lat) || none(lon) {
         return Ok(None);
     }
-    let (time, time_at) = row.field(sink, places.time, "time")?;
-    let mut found = Fix::new(0, time_of(time, time_at, unit, clock)?, row.at);
+    let mut found = Fix::new(0, row_time(sink, row, (places, unit), clock)?, row.at);
     found.lat_deg = sink.lat_at(lat, lat_at)?;
     found.lon_deg = sink.lon_at(lon, lon_at)?;
     let (height, at) = row.field(sink, places.height, "height")?;
@@ -230,6 +305,34 @@ fn fix(
     Ok(Some(found))
 }
 
+/// Whether a field says that there is nothing.
+fn none(text: &str) -> bool {
+    text.is_empty() || ["nan", "nat", "null", "none"].iter().any(|no| text.eq_ignore_ascii_case(no))
+}
+
+/// When the place of a row was measured, else when the row was written.
+fn row_time(
+    sink: &Sink<'_>,
+    row: &Row<'_>,
+    (places, unit): (&Places, TimeUnit),
+    clock: &mut Clock,
+) -> Result<i64, Wrong> {
+    if let Some(measured) = places.measured {
+        let (text, at) = row.field(sink, measured, "time of the place")?;
+        if !none(text) {
+            return time_of(text, at, unit, clock);
+        }
+    }
+    let (time, at) = row.field(sink, places.time, "time")?;
+    let Some(date) = places.date else { return time_of(time, at, unit, clock) };
+    let (date, _) = row.field(sink, date, "date")?;
+    let zone = match places.zone {
+        Some(zone) => row.field(sink, zone, "zone")?.0,
+        None => "",
+    };
+    time_of(&format!("{date}T{time}{zone}"), at, TimeUnit::Auto, clock)
+}
+
 /// A time in any of the ways that tables write it.
 pub(crate) fn time_of(
     text: &str,
@@ -239,7 +342,9 @@ pub(crate) fn time_of(
 ) -> Result<i64, Wrong> {
     let wrong = |expected: &str| Wrong::new(at, "time", text, expected);
     match unit {
-        TimeUnit::Auto if text.get(1..).unwrap_or("").contains('-') && text.contains(':') => {
+        TimeUnit::Auto
+            if text.get(1..).unwrap_or("").contains(['-', '/']) && text.contains(':') =>
+        {
             let stamp = clock::iso(text);
             Ok(clock.whole(stamp.ok_or_else(|| wrong("a time, as 2024-07-15T09:00:00Z"))?))
         }
