@@ -1,4 +1,5 @@
-//! ADS-B as JSON: records, lines of records, OpenSky tracks, traces of readsb.
+//! ADS-B as JSON: records, lines of records, columns as pandas writes them, OpenSky's tracks and
+//! states, readsb's traces and snapshots.
 //!
 //! In:    the text of a file.
 //! Out:   a fix for each record with a position; each aircraft is a recording.
@@ -15,6 +16,24 @@ use crate::fault::{TrackError, Wrong};
 use crate::fixes::{Datum, FOOT_M, Fix, Said, Sink};
 use serde_json::value::RawValue;
 use std::collections::BTreeMap;
+
+/// What is where in OpenSky's arrays; the others are not needed.
+const STATES: [&str; 14] = [
+    "icao24",
+    "callsign",
+    "origin_country",
+    "time_position",
+    "last_contact",
+    "longitude",
+    "latitude",
+    "baro_altitude",
+    "on_ground",
+    "velocity",
+    "true_track",
+    "vertical_rate",
+    "sensors",
+    "geo_altitude",
+];
 
 type Record<'j> = BTreeMap<String, &'j RawValue>;
 
@@ -96,7 +115,55 @@ fn whole(sink: &mut Sink<'_>, state: &mut State, value: &RawValue) -> Result<(),
             return rows_of(sink, state, (&record, rows, is_trace));
         }
     }
+    for list in ["aircraft", "ac", "states", "trail"] {
+        if let Some(rows) = record.get(list) {
+            return snapshot(sink, state, (&record, rows));
+        }
+    }
+    let is_columns = record.get("latitude").or(record.get("lat"));
+    if is_columns.is_some_and(|column| column.get().starts_with('{')) {
+        return columns(sink, state, &record);
+    }
     one(sink, state, &record)
+}
+
+/// All aircraft at one time: readsb's and tar1090's records, which may name how many seconds ago a
+/// place was seen, or OpenSky's arrays. Or Flightradar24's trail of one, whose records have times.
+fn snapshot(
+    sink: &mut Sink<'_>,
+    state: &mut State,
+    (record, rows): (&Record<'_>, &RawValue),
+) -> Result<(), TrackError> {
+    let now = record.get("now").or(record.get("time")).copied();
+    for row in serde_json::from_str::<Vec<&RawValue>>(rows.get()).unwrap_or_default() {
+        let array = serde_json::from_str::<Vec<&RawValue>>(row.get());
+        let named = match array {
+            Ok(parts) => {
+                let names = STATES.iter().zip(parts);
+                names.map(|(name, part)| ((*name).to_owned(), part)).collect()
+            }
+            Err(_) => serde_json::from_str::<Record<'_>>(row.get()).unwrap_or_default(),
+        };
+        let mut named: Record<'_> =
+            named.into_iter().filter(|(_, value)| value.get() != "null").collect();
+        if let Some(now) = now {
+            named.entry("now".into()).or_insert(now);
+        }
+        one(sink, state, &named)?;
+    }
+    Ok(())
+}
+
+/// Objects of columns by row, as pandas writes a table without being told otherwise.
+fn columns(sink: &mut Sink<'_>, state: &mut State, record: &Record<'_>) -> Result<(), TrackError> {
+    let mut rows: BTreeMap<(usize, String), Record<'_>> = BTreeMap::new();
+    for (name, column) in record {
+        for (row, value) in serde_json::from_str::<Record<'_>>(column.get()).unwrap_or_default() {
+            // Rows are numbered mostly: 10 comes after 9.
+            rows.entry((row.len(), row)).or_default().insert(name.clone(), value);
+        }
+    }
+    rows.values().try_for_each(|record| one(sink, state, record))
 }
 
 /// Adds what a record gave.
@@ -111,7 +178,8 @@ fn add(sink: &mut Sink<'_>, found: Result<Option<Fix>, Wrong>) -> Result<(), Tra
 
 fn text_of(value: &RawValue) -> Option<&str> {
     let text = value.get();
-    (text != "null").then(|| text.trim_matches('"'))
+    let is_none = matches!(text, "null" | "\"NaT\"" | "NaN");
+    (!is_none).then(|| text.trim_matches('"'))
 }
 
 fn aircraft<'s>(sink: &mut Sink<'_>, state: &'s mut State, id: &str) -> &'s mut Aircraft {
@@ -137,13 +205,19 @@ fn fix_of(
     };
     let (lat, lon) = (get(&["latitude", "lat"]), get(&["longitude", "lon", "lng"]));
     let (Some(lat), Some(lon)) = (lat, lon) else { return Ok(None) };
-    let Some(time) = get(&["timestamp", "time", "now", "last_position"]) else {
+    let measured = get(&["time_position", "lastposupdate", "last_position"]);
+    let Some(time) = measured.or(get(&["timestamp", "time", "ts", "now"])) else {
         return Err(Wrong::new(sink.text.offset(lat), "time", "nothing", "timestamp or time"));
     };
     let id = get(&["icao24", "hex", "icao", "flight_id"]).unwrap_or("");
     let aircraft = aircraft(sink, state, id);
     let at = sink.text.offset(time);
-    let time_ns = time_of(time, at, TimeUnit::Auto, &mut aircraft.clock)?;
+    let mut time_ns = time_of(time, at, TimeUnit::Auto, &mut aircraft.clock)?;
+    if let Some(ago) = get(&["seen_pos"]) {
+        #[expect(clippy::cast_possible_truncation, reason = "at most 1e15, by the range given")]
+        let ago_ns = (sink.number("seen_pos", ago, 0.0..=1e6)? * 1e9).round() as i64;
+        time_ns = time_ns.saturating_sub(ago_ns);
+    }
     let mut fix = Fix::new(aircraft.track, time_ns, at);
     fix.lat_deg = sink.lat(lat)?;
     fix.lon_deg = sink.lon(lon)?;
@@ -151,7 +225,7 @@ fn fix_of(
     let is_metres = record.contains_key("baroaltitude") || record.contains_key("baro_altitude");
     let unit_m = if is_metres { 1.0 } else { FOOT_M };
     (sink.height_unit_m, sink.pressure_unit_m) = (unit_m, unit_m);
-    let pressure = get(&["baroaltitude", "baro_altitude", "altitude", "alt_baro"]);
+    let pressure = get(&["baroaltitude", "baro_altitude", "altitude", "alt_baro", "alt"]);
     if let Some(text) = pressure.filter(|text| *text != "ground") {
         fix.pressure_m = sink.pressure_at(text, sink.text.offset(text))?;
     }
