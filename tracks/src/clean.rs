@@ -6,6 +6,7 @@
 //! Not here: smoothing (`smooth`), choosing among stretches (the caller).
 
 use crate::fixes::Fixes;
+use crate::format::Format;
 use core::fmt;
 use glam::DVec3;
 use overfly_core::geodesy::{Ellipsoid, Geodetic};
@@ -20,6 +21,11 @@ const GAP_S: [f64; 2] = [60.0, 600.0];
 /// A jump is this many times as fast as nine in ten of the steps, and at least so fast in m/s.
 const JUMP_TIMES: f64 = 5.0;
 const JUMP_LEAST_MPS: f64 = 100.0;
+/// Receivers of transponders repeat a place until the next one comes, at most so long.
+const STALE_NS: i64 = 10_000_000_000;
+/// Transponders send places 0.4 s to 0.6 s apart (DO-260B); what comes sooner is the
+/// one before, by way of another receiver.
+const SQUITTER_NS: i64 = 350_000_000;
 /// Steps that say how fast a recording is.
 const STEPS_MAX: usize = 20_000;
 
@@ -49,14 +55,16 @@ impl fmt::Display for Note {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Dropped {
     SameTime,
+    Stale,
     Back,
     Ahead,
     Spike,
     Lonely,
 }
 
-const REASONS: [(Dropped, &str); 5] = [
+const REASONS: [(Dropped, &str); 6] = [
     (Dropped::SameTime, "left out, being of the same time as the one before"),
+    (Dropped::Stale, "left out, as repeating the place before by another way"),
     (Dropped::Back, "left out, since its time goes back"),
     (Dropped::Ahead, "left out, since its time runs ahead of those after it"),
     (Dropped::Spike, "left out, since nothing flies there and back so fast"),
@@ -83,6 +91,8 @@ pub(crate) struct Cleaner<'f> {
     fixes: &'f Fixes,
     places: Vec<DVec3>,
     gap_s: Option<f64>,
+    /// Whether a place may be an old one, repeated.
+    repeats: bool,
     dropped: Vec<(Dropped, u32)>,
     cuts: Vec<Note>,
 }
@@ -96,7 +106,9 @@ pub(crate) fn clean(fixes: &Fixes, gap_s: Option<f64>) -> (Vec<Vec<usize>>, Vec<
         body.ecef_from_geodetic(Geodetic { lat_rad, lon_rad, height_m: 0.0 }).0
     };
     let places = (0..fixes.track.len()).map(place).collect();
-    let mut cleaner = Cleaner { fixes, places, gap_s, dropped: Vec::new(), cuts: Vec::new() };
+    let repeats = matches!(fixes.format, Format::AdsbCsv | Format::AdsbJson | Format::BaseStation);
+    let mut cleaner =
+        Cleaner { fixes, places, gap_s, repeats, dropped: Vec::new(), cuts: Vec::new() };
     let tracks = fixes.track.iter().fold(0, |most, &track| most.max(track));
     let mut rows: Vec<Vec<usize>> = vec![Vec::new(); usize::try_from(tracks).unwrap_or(0) + 1];
     for (row, &track) in fixes.track.iter().enumerate() {
@@ -169,6 +181,11 @@ impl Cleaner<'_> {
         let step_ns = self.time(row) - self.time(last);
         if step_ns.abs() < SAME_NS {
             return Verdict::Drop(Dropped::SameTime);
+        }
+        let is_same = self.places[row] == self.places[last];
+        let stale_ns = if is_same { STALE_NS } else { SQUITTER_NS };
+        if self.repeats && (0..stale_ns).contains(&step_ns) {
+            return Verdict::Drop(Dropped::Stale);
         }
         if step_ns < 0 {
             let goes_on = ahead.iter().any(|&next| self.time(next) > self.time(last));

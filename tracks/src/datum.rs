@@ -11,6 +11,7 @@
 
 use crate::fault::TrackError;
 use crate::fixes::{Datum, Fixes, Said};
+use std::collections::BTreeMap;
 
 /// A height is a spike where it is farther than this from those around, and faster than that.
 const SPIKE_M: f64 = 100.0;
@@ -67,15 +68,53 @@ pub(crate) fn resolve(
             _ => height_m + undulation_m(fixes.lat_rad[i], fixes.lon_rad[i]),
         }
     };
-    let height_m: Vec<f64> = column.iter().enumerate().map(height).collect();
+    let mut height_m: Vec<f64> = column.iter().enumerate().map(height).collect();
+    let moved = if is_pressure { 0 } else { fill_by_pressure(fixes, &mut height_m) };
     let geoid = match datum {
         Datum::Ellipsoid => "",
         Datum::Msl if own > 0 => ", by the geoid that the file has",
         Datum::Msl => ", by the geoid EGM96",
         Datum::Pressure => ", taken as heights above sea level of a standard atmosphere",
     };
-    let assumed = format!("altitudes are {}{geoid}: {why}", datum.words());
+    let mut assumed = format!("altitudes are {}{geoid}: {why}", datum.words());
+    if moved > 0 {
+        let by = "pressure altitudes stand for, moved by what they are off around";
+        assumed += &format!("; for {moved} that lack {by}");
+    }
     Ok(Heights { height_m, step_m, assumed })
+}
+
+/// Fills heights that are missing with pressure altitudes, moved by how far these are off in the rows
+/// before and after: that changes slowly, which heights do not. Returns how many.
+fn fill_by_pressure(fixes: &Fixes, height_m: &mut [f64]) -> usize {
+    let is_none =
+        |pressure_m: f64| pressure_m.is_nan() || (fixes.zero_is_none && pressure_m == 0.0);
+    let mut tracks: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (row, &track) in fixes.track.iter().enumerate() {
+        if !is_none(fixes.pressure_m[row]) {
+            tracks.entry(track).or_default().push(row);
+        }
+    }
+    let mut moved = 0;
+    for rows in tracks.values() {
+        let start_ns = fixes.time_ns[rows[0]];
+        let seconds = |&row: &usize| (fixes.time_ns[row] - start_ns) as f64 / 1e9;
+        let times_s: Vec<f64> = rows.iter().map(seconds).collect();
+        let mut off_m: Vec<f64> =
+            rows.iter().map(|&row| height_m[row] - fixes.pressure_m[row]).collect();
+        // Times that go back would make a line of it run wild.
+        if off_m.iter().all(|off| off.is_nan()) || times_s.windows(2).any(|t| t[1] <= t[0]) {
+            continue;
+        }
+        fill(&times_s, &mut off_m);
+        for (&row, off) in rows.iter().zip(off_m) {
+            if height_m[row].is_nan() {
+                height_m[row] = fixes.pressure_m[row] + off;
+                moved += 1;
+            }
+        }
+    }
+    moved
 }
 
 /// Whether a height of 0 may be one: those around it are near the sea, too.
