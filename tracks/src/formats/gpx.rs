@@ -25,7 +25,7 @@ struct Point {
 pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     let mut open: Option<Point> = None;
     let mut clock = Clock::default();
-    let (mut timeless, mut undulations) = (0_usize, 0_usize);
+    let (mut timeless, mut undulations, mut waypoints) = (0_usize, 0_usize, 0_usize);
     walk(sink, |sink, step, at| {
         match step {
             Step::Begin("trk" | "rte", _) => {
@@ -66,10 +66,15 @@ pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
                     _ => {}
                 }
             }
+            Step::Begin("wpt", _) => waypoints += 1,
             Step::Begin(..) => {}
         }
         Ok(())
     })?;
+    if sink.fixes.track.is_empty() && sink.fixes.fault_count + timeless == 0 && waypoints > 0 {
+        let why = format!("no track or route in it, and its {waypoints} waypoints are none");
+        return Err(TrackError::Empty { format: sink.fixes.format, why });
+    }
     if sink.fixes.track.is_empty() && sink.fixes.fault_count == 0 && timeless > 0 {
         let why = format!("none of its {timeless} points has a time");
         return Err(TrackError::Empty { format: sink.fixes.format, why });

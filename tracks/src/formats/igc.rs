@@ -35,6 +35,7 @@ pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     sink.position_unit_deg = 1.0 / 60.0;
     sink.fixes.zero_is_none = true;
     for line in sink.text.lines() {
+        let line = line.trim_start();
         match line.as_bytes().first() {
             Some(b'B') => match fix(sink, line, &extensions, &mut clock) {
                 Ok(Some(found)) => sink.push(found)?,
@@ -66,13 +67,17 @@ fn said(header: &Header) -> Said {
         upper if upper.contains("ELL") => declared(Datum::Ellipsoid),
         upper if upper.contains("GEO") || upper.contains("MSL") => declared(Datum::Msl),
         upper if upper.contains("NIL") => Said::Unknown("HFALG says that there are none".into()),
-        _ if header.maker.is_empty() || header.maker.starts_with('X') => {
-            let why = "it has no HFALG line and no approved maker, and receivers give that";
-            Said::Habit(Datum::Msl, why.into())
-        }
         _ => {
-            let why = "it has no HFALG line, and IGC asks that of approved recorders";
-            Said::Habit(Datum::Ellipsoid, why.into())
+            let lacks =
+                if value.is_empty() { "it has no HFALG line" } else { "HFALG says nothing" };
+            if header.maker.is_empty() || header.maker.starts_with('X') {
+                let why = format!("{lacks} and it has no approved maker, and receivers give that");
+                return Said::Habit(Datum::Msl, why);
+            }
+            Said::Habit(
+                Datum::Ellipsoid,
+                format!("{lacks}, and IGC asks that of approved recorders"),
+            )
         }
     }
 }
@@ -88,16 +93,19 @@ fn header_line(
     match kind {
         "DTE" => {
             let begin = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
-            let figures = rest[begin..].get(..6).unwrap_or(&rest[begin..]);
+            let text = rest[begin..].split(',').next().unwrap_or("").trim_end();
+            // Some write points or dashes between, or four figures of the year.
+            let figures: String = text.chars().filter(|c| !matches!(c, '-' | '.' | '/')).collect();
             let part = |range| figures.get(range).and_then(clock::digits);
-            let day = match (part(4..6), part(2..4), part(0..2)) {
+            let end = if figures.len() == 8 { 8 } else { 6 };
+            let day = match (part(4..end), part(2..4), part(0..2)) {
                 (Some(year), Some(month), Some(day)) => {
                     clock::days(clock::full_year(year), month, day)
                 }
                 _ => None,
             };
-            let at = sink.text.offset(figures);
-            clock.set_day(day.ok_or_else(|| Wrong::new(at, "date", figures, "a date, DDMMYY"))?);
+            let at = sink.text.offset(text);
+            clock.set_day(day.ok_or_else(|| Wrong::new(at, "date", text, "a date, DDMMYY"))?);
         }
         "ALG" => {
             let value = rest.split_once(':').map_or(rest, |(_, value)| value).trim();

@@ -1,17 +1,18 @@
 //! NMEA 0183: what GPS receivers say.
 //!
 //! In:    the text of a log.
-//! Out:   a fix for each GGA or GNS sentence with a position; dates from RMC and ZDA.
+//! Out:   a fix for each GGA or GNS sentence with a position, or of RMC where there are none; dates
+//! from RMC and ZDA; pressure altitudes from Garmin's PGRMZ, which `FLARM` writes, too.
 //! Keeps: nothing.
 //! Not here: satellites, speeds, other devices on the bus.
-//! Source: NMEA 0183 4.11, sentences GGA, GNS, RMC, ZDA.
+//! Source: NMEA 0183 4.11, sentences GGA, GNS, RMC, ZDA; Garmin Proprietary NMEA 0183, PGRMZ.
 //!
 //! By hand rather than with the crate `nmea`: that gives no column of a fault, and merges sentences
 //! before one can see which of them has the date.
 
 use crate::clock::{self, Clock, Stamp};
 use crate::fault::{TrackError, Wrong};
-use crate::fixes::{Datum, Fix, Said, Sink};
+use crate::fixes::{Datum, FOOT_M, Fix, Said, Sink};
 
 /// A fix that may still wait for its date.
 struct Waiting {
@@ -22,20 +23,29 @@ struct Waiting {
 
 pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     let mut waiting: Vec<Waiting> = Vec::new();
+    let kinds = || sink.text.lines().filter_map(|line| line.split_once('$')?.1.get(2..6));
+    let has_heights = kinds().any(|kind| matches!(kind, "GGA," | "GNS,"));
     // Time of day and day of the last sentence with a date.
     let mut dated: Option<(i64, i64)> = None;
     sink.position_unit_deg = 1.0 / 60.0;
+    sink.pressure_unit_m = FOOT_M;
     sink.fixes.said = Said::Declared(Datum::Msl, "GGA sentences are by definition".into());
     for line in sink.text.lines() {
         let Some(begin) = line.find('$') else { continue };
         let line = &line[begin..];
         let fields: Vec<&str> = line.split('*').next().unwrap_or("").split(',').collect();
         let Some(kind) = fields[0].get(3..6) else { continue };
-        if !matches!(kind, "GGA" | "GNS" | "RMC" | "ZDA") {
+        if !matches!(kind, "GGA" | "GNS" | "RMC" | "ZDA") && fields[0] != "$PGRMZ" {
             continue;
         }
         sink.records += 1;
         let done = check(sink, line).and_then(|()| match kind {
+            "RMZ" => pressure(sink, &fields, waiting.last_mut()).map(|()| None),
+            "RMC" if !has_heights => {
+                let found = fix(sink, &fields, kind)?;
+                waiting.extend(found);
+                date(sink, &fields, (9, None))
+            }
             "RMC" => date(sink, &fields, (9, None)),
             "ZDA" => date(sink, &fields, (2, Some(4))),
             _ => fix(sink, &fields, kind).map(|fix| {
@@ -130,23 +140,39 @@ fn date(
     Ok(Some((stamp.ns, found.ok_or_else(wrong)?)))
 }
 
-/// The fix of GGA or GNS, whose positions and heights are in the same fields but for one.
+/// The pressure altitude of the last fix: feet, though a field says `f`.
+fn pressure(sink: &mut Sink<'_>, fields: &[&str], last: Option<&mut Waiting>) -> Result<(), Wrong> {
+    let text = fields.get(1).copied().unwrap_or("").trim();
+    if let Some(last) = last.filter(|_| !text.is_empty()) {
+        last.fix.pressure_m = sink.pressure_at(text, sink.text.offset(text))?;
+    }
+    Ok(())
+}
+
+/// The fix of GGA or GNS, whose positions and heights are in the same fields but for one; or of RMC,
+/// which has no heights and one field more before the position.
 fn fix(sink: &mut Sink<'_>, fields: &[&str], kind: &str) -> Result<Option<Waiting>, Wrong> {
     let field = |at: usize| fields.get(at).copied().unwrap_or("").trim();
-    let is_fixed = match kind {
-        "GGA" => field(6) != "0",
-        _ => field(6).bytes().any(|mode| mode != b'N'),
+    let (is_fixed, first) = match kind {
+        "GGA" => (field(6) != "0", 2),
+        "RMC" => (field(2) == "A", 3),
+        _ => (field(6).bytes().any(|mode| mode != b'N'), 2),
     };
+    let [lat, north, lon, east] = [0, 1, 2, 3].map(|i| field(first + i));
     let Some(stamp) = time_of(sink, fields)? else { return Ok(None) };
-    if !is_fixed || field(2).is_empty() || field(4).is_empty() {
+    if !is_fixed || lat.is_empty() || lon.is_empty() {
         return Ok(None);
     }
     let mut found = Fix::new(0, 0, sink.text.offset(fields[0]));
-    found.lat_deg = angle(sink, "latitude", [field(2), field(3)], ("N", "S", 90.0))?;
-    found.lon_deg = angle(sink, "longitude", [field(4), field(5)], ("E", "W", 180.0))?;
-    sink.note_position(minutes(field(2)), minutes(field(4)));
-    let undulation = field(if kind == "GGA" { 11 } else { 10 });
-    if !field(9).is_empty() {
+    found.lat_deg = angle(sink, "latitude", [lat, north], ("N", "S", 90.0))?;
+    found.lon_deg = angle(sink, "longitude", [lon, east], ("E", "W", 180.0))?;
+    sink.note_position(minutes(lat), minutes(lon));
+    let undulation = match kind {
+        "RMC" => "",
+        "GGA" => field(11),
+        _ => field(10),
+    };
+    if kind != "RMC" && !field(9).is_empty() {
         found.height_m = sink.height(field(9))?;
     }
     if !undulation.is_empty() {
