@@ -143,6 +143,7 @@ survives! {
     kml_survives_mutations: "a.kml", samples::kml().into_bytes();
     placemarks_survive_mutations: "b.kml", samples::placemarks().into_bytes();
     fdr_4_survives_mutations: "a.fdr", samples::fdr_4().into_bytes();
+    fdr_1_survives_mutations: "c.fdr", samples::fdr_1().into_bytes();
     fdr_3_survives_mutations: "b.fdr", samples::fdr_3().into_bytes();
     acmi_survives_mutations: "a.acmi", samples::acmi().into_bytes();
     zipped_acmi_survives_mutations: "a.zip.acmi", samples::zipped("a.txt.acmi", &samples::acmi());
@@ -151,7 +152,33 @@ survives! {
     adsb_csv_survives_mutations: "b.csv", samples::adsb_csv().into_bytes();
     adsb_records_survive_mutations: "a.json", samples::adsb_json().into_bytes();
     adsb_traces_survive_mutations: "b.json", samples::trace_json().into_bytes();
+    adsb_snapshots_survive_mutations: "c.json", samples::snapshots().into_bytes();
+    adsb_columns_survive_mutations: "d.json", samples::columns_json().into_bytes();
+    base_station_survives_mutations: "a.txt", samples::base_station().into_bytes();
+    wide_csv_survives_mutations: "e.csv", samples::utf_16(&samples::own_csv(), "\u{FEFF}");
+    gps_dump_survives_mutations: "c.kml", samples::gps_dump().into_bytes();
+    arrays_survive_mutations: "d.kml", samples::arrays_kml().into_bytes();
+    terminals_survive_mutations: "a.log", samples::terminal().into_bytes();
+    g1000_survives_mutations: "f.csv", samples::g1000().into_bytes();
     own_csv_survives_mutations: "c.csv", samples::own_csv().into_bytes();
+}
+
+/// Check sums find nearly all that is done to a packed file: half of the rounds damage what is in it.
+#[test]
+fn gzip_survives_mutations_inside_and_out() {
+    let (igc, mut dice) = (samples::igc().into_bytes(), Dice(11));
+    let packed = samples::gzipped(&igc);
+    let options = Options::default();
+    assert!(check(&packed, "a.igc.gz", &options));
+    let mut imported = 0;
+    for round in 0..ROUNDS {
+        let bytes = match round % 2 {
+            0 => mutated(&packed, &mut dice),
+            _ => samples::gzipped(&mutated(&igc, &mut dice)),
+        };
+        imported += u32::from(check(&bytes, "a.igc.gz", &options));
+    }
+    assert!(imported > 100, "hardly any mutation imports");
 }
 
 #[test]
@@ -178,6 +205,10 @@ fn archives_that_unpack_to_too_much_are_refused() {
     let bomb = samples::zipped("a.txt.acmi", &"0".repeat(5 << 20));
     assert!(bomb.len() < 100_000);
     let error = import(&bomb, "a.zip.acmi", &options, &|_, _| 0.0).unwrap_err();
+    assert!(error.to_string().contains("larger than 1048576 bytes"), "{error}");
+    let bomb = samples::gzipped("0".repeat(5 << 20).as_bytes());
+    assert!(bomb.len() < 100_000);
+    let error = import(&bomb, "a.json", &options, &|_, _| 0.0).unwrap_err();
     assert!(error.to_string().contains("larger than 1048576 bytes"), "{error}");
     let error = import(&vec![b' '; 2 << 20], "a.csv", &options, &|_, _| 0.0).unwrap_err();
     assert!(matches!(error, TrackError::TooLarge { .. }), "{error}");
