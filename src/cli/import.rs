@@ -40,9 +40,10 @@ const PAGES: usize = 1024;
 /// Shown under `import --help`.
 const TEACHES: &str = "\
 Formats, known by what is in the file: IGC, GPX, KML and KMZ (gx:Track, or placemarks with times),
-X-Plane .fdr (versions 3 and 4), Tacview .acmi (text or zipped), NMEA, FlightGear's generic CSV,
-ADS-B as CSV or JSON (traffic library, OpenSky, readsb traces), and overfly's own CSV. Any other
-table needs a column map, FILE.columns.ron or --columns; docs/import.md has examples.
+X-Plane .fdr (versions 1 to 4), Tacview .acmi (text or zipped), NMEA, FlightGear's generic CSV,
+ADS-B as CSV, JSON or BaseStation's lines (traffic library, OpenSky, readsb, Flightradar24), tables
+of ForeFlight and Garmin, and overfly's own CSV; gzipped, zipped or not. Any other table needs a
+column map, FILE.columns.ron or --columns; docs/import.md has examples.
 
 What altitudes are above is what the file declares, else the habit of its format, else --altitude
 must say; one line says what was assumed. Time that goes back, fixes of one time, jumps and gaps are
