@@ -53,6 +53,8 @@ pub(crate) fn resolve(
     let steps = &fixes.steps;
     let step_m = if is_pressure { steps.pressure_m } else { steps.height_m };
     let mut own = 0_usize;
+    // Receivers without a geoid of their own say 0 throughout.
+    let knows = fixes.undulation_m.iter().any(|own_m| own_m.is_finite() && *own_m != 0.0);
     let height = |(i, &height_m): (usize, &f64)| {
         let is_none = height_m.is_nan() || (fixes.zero_is_none && height_m == 0.0);
         if is_none && !near_zero(column, i) {
@@ -61,7 +63,7 @@ pub(crate) fn resolve(
         let from_file = fixes.undulation_m[i];
         match datum {
             Datum::Ellipsoid => height_m,
-            _ if datum == Datum::Msl && from_file.is_finite() => {
+            _ if datum == Datum::Msl && from_file.is_finite() && knows => {
                 own += 1;
                 height_m + from_file
             }
