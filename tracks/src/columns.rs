@@ -134,6 +134,9 @@ pub struct ColumnMap {
     /// Headings; used where pitch and roll are there, too.
     #[serde(default)]
     pub heading: Option<Key>,
+    /// What is added to headings to make them true: the variation, east positive.
+    #[serde(default)]
+    pub variation: Option<Key>,
     /// Pitches, nose up.
     #[serde(default)]
     pub pitch: Option<Key>,
@@ -279,9 +282,13 @@ pub(crate) fn known(titles: &[String], separator: char) -> Result<(ColumnMap, Fo
     })?;
     let is_adsb = format == Format::AdsbCsv;
     let is_foreflight = has_foreflight(titles);
-    let attitude = |names: &[&str], theirs: &str| match () {
+    // Garmin's headings are magnetic, with the variation beside them.
+    let variation = find(&["magvar"]).filter(|_| find(&["hdg"]).is_some());
+    let is_garmin = variation.is_some();
+    let attitude = |names: &[&str], [theirs, garmins]: [&str; 2]| match () {
         () if is_adsb => None,
-        () if is_foreflight => Some(Key::Title(theirs.to_owned())),
+        () if is_foreflight => find(&[theirs]),
+        () if is_garmin => find(&[garmins]),
         () => find(names),
     };
     let map = ColumnMap {
@@ -292,9 +299,10 @@ pub(crate) fn known(titles: &[String], separator: char) -> Result<(ColumnMap, Fo
         longitude,
         altitude,
         pressure,
-        heading: attitude(&HEADINGS, "course"),
-        pitch: attitude(&PITCHES, "pitch"),
-        roll: attitude(&ROLLS, "bank"),
+        heading: attitude(&HEADINGS, ["course", "hdg"]),
+        variation,
+        pitch: attitude(&PITCHES, ["pitch", "pitch"]),
+        roll: attitude(&ROLLS, ["bank", "roll"]),
         id: find(&IDS),
         angles: AngleUnit::Degrees,
     };

@@ -94,7 +94,7 @@ fn what_macs_put_into_archives_is_no_flight() {
 
 #[test]
 fn angles_in_arrays_and_tables_are_those_of_the_file() {
-    for text in [samples::arrays_kml(), samples::foreflight()] {
+    for text in [samples::arrays_kml(), samples::foreflight(), samples::g1000()] {
         let flight = &of(text.as_bytes()).flights[0];
         let pose = flight.pose(5.0);
         let angles = [pose.heading, pose.pitch, pose.roll].map(|angle| angle.to_degrees());
@@ -203,6 +203,15 @@ fn tacviews_objects_have_names_before_places_and_types() {
     assert!(found.flights.iter().any(|flight| flight.is_aside && flight.duration_s() > 300.0));
     let old = samples::acmi().replace("FileVersion=2.2", "FileVersion=1.5");
     assert!(error(old.as_bytes()).contains("line 2, column 13: FileVersion is \"1.5\""));
+}
+
+#[test]
+fn a_geoid_that_is_0_throughout_is_none() {
+    let zero = samples::nmea().replace(",M,48.5,M,,", ",M,0.0,M,,");
+    let bare: String =
+        zero.lines().map(|line| line.split('*').next().unwrap().to_owned() + "\n").collect();
+    is_the_climb(bare.as_bytes(), Format::Nmea);
+    assert!(of(bare.as_bytes()).assumed.contains("EGM96"));
 }
 
 #[test]

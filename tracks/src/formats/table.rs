@@ -32,6 +32,7 @@ struct Places {
     is_pressure: bool,
     pressure: Option<usize>,
     attitude: Option<[usize; 3]>,
+    variation: Option<usize>,
     id: Option<usize>,
 }
 
@@ -189,6 +190,7 @@ fn places(map: &ColumnMap, titles: &[String]) -> Result<Places, TrackError> {
         is_pressure: map.altitude.datum.map(Datum::from) == Some(Datum::Pressure),
         pressure: map.pressure.as_ref().map(|column| place(&column.column)).transpose()?,
         attitude,
+        variation: some(&map.variation)?,
         id: some(&map.id)?,
     })
 }
@@ -300,6 +302,14 @@ fn fix(
             if !none(text) {
                 found.attitude_deg[i] = sink.angle_at(name, text, at)?;
             }
+        }
+        if let Some(variation) = places.variation {
+            let (text, at) = row.field(sink, variation, "variation")?;
+            let unit = sink.angle_unit_deg;
+            found.attitude_deg[0] += match none(text) {
+                true => f64::NAN,
+                false => number_at("variation", text, at, -180.0 / unit..=180.0 / unit)? * unit,
+            };
         }
     }
     Ok(Some(found))

@@ -292,13 +292,13 @@ pub fn g1000() -> String {
         let (lat, lon, height) = place(second);
         let feet = height / 0.3048;
         format!(
-            "2024-07-15, 11:00:{second:02},  +02:00, {lat:12.7}, {lon:12.7}, 6543.2, {feet:7.1}, 3\r\n"
+            "2024-07-15, 11:00:{second:02},  +02:00, {lat:12.7}, {lon:12.7}, 6543.2, {feet:7.1}, 3.0, -7.0, 328.5,   11.5\r\n"
         )
     };
     let head = "#airframe_info, log_version=\"1.00\"\r\n\
-                #yyy-mm-dd, hh:mm:ss, hh:mm, degrees, degrees, ft Baro, ft msl, deg\r\n  \
-                Lcl Date, Lcl Time, UTCOfst, Latitude, Longitude, AltB, AltMSL, Pitch\r\n        \
-                , , , , , , ,\r\n";
+                #yyy-mm-dd, hh:mm:ss, hh:mm, degrees, degrees, ft Baro, ft msl, deg, deg, deg, deg\r\n  \
+                Lcl Date, Lcl Time, UTCOfst, Latitude, Longitude, AltB, AltMSL, Pitch, Roll, HDG, MagVar\r\n        \
+                , , , , , , , , , ,\r\n";
     text(head, row, "")
 }
 
