@@ -200,6 +200,8 @@ fn tacviews_objects_have_names_before_places_and_types() {
     let found = import(text.as_bytes(), "a.acmi", &options, &|_, _| 0.0).unwrap();
     let longest = &found.flights[found.longest()];
     assert_eq!((found.flights.len(), longest.name.as_str()), (2, "Glider, red"));
+    let word = samples::acmi().replace("a1,T=", "x0001,T=").replace(",Type", ",Pilot=Ann,Type");
+    assert_eq!(of(word.as_bytes()).flights[0].name, "Glider, red, Ann");
     assert!(found.flights.iter().any(|flight| flight.is_aside && flight.duration_s() > 300.0));
     let old = samples::acmi().replace("FileVersion=2.2", "FileVersion=1.5");
     assert!(error(old.as_bytes()).contains("line 2, column 13: FileVersion is \"1.5\""));

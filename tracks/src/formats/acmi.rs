@@ -21,7 +21,9 @@ const FRAME_S: f64 = 31_536_000.0;
 struct Object {
     /// Its recording, from its first place on.
     track: Option<u32>,
+    /// What it is, and who flies it: a mission has many of one kind.
     name: Option<String>,
+    pilot: Option<String>,
     /// Whether its type says that it is no aircraft.
     is_aside: bool,
     /// Longitude, latitude (with the reference's added), metres, roll, pitch, yaw.
@@ -30,13 +32,14 @@ struct Object {
 
 impl Default for Object {
     fn default() -> Self {
-        Self { track: None, name: None, is_aside: false, place: [f64::NAN; 6] }
+        Self { track: None, name: None, pilot: None, is_aside: false, place: [f64::NAN; 6] }
     }
 }
 
 #[derive(Default)]
-struct Scene {
-    objects: BTreeMap<u64, Object>,
+struct Scene<'a> {
+    /// By number; some writers make up words instead.
+    objects: BTreeMap<(u64, &'a str), Object>,
     /// UTC of frame 0.
     start_ns: i64,
     /// The frame, since the start.
@@ -71,7 +74,11 @@ pub(crate) fn read(sink: &mut Sink<'_>) -> Result<(), TrackError> {
     Ok(())
 }
 
-fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<Fix>, Wrong> {
+fn record<'a>(
+    sink: &mut Sink<'_>,
+    scene: &mut Scene<'a>,
+    line: &'a str,
+) -> Result<Option<Fix>, Wrong> {
     let at = sink.text.offset(line);
     if let Some(seconds) = line.strip_prefix('#') {
         let value = sink.number("frame", seconds, -FRAME_S..=FRAME_S)?;
@@ -81,20 +88,22 @@ fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<F
         return Ok(None);
     }
     if let Some(id) = line.strip_prefix('-') {
-        let id = u64::from_str_radix(id.trim(), 16).ok();
-        id.and_then(|id| scene.objects.remove(&id));
+        let number = u64::from_str_radix(id.trim(), 16).ok();
+        scene.objects.remove(&number.map_or((0, id), |number| (number, "")));
         return Ok(None);
     }
     let mut parts = properties(line);
     let Some(id) = parts.next() else { return Ok(None) };
-    let Ok(id) = u64::from_str_radix(id.trim(), 16) else {
+    let number = u64::from_str_radix(id.trim(), 16).ok();
+    if number.is_none() && !line.contains(",T=") {
         let is_header =
             line.is_empty() || line.starts_with("FileType") || line.starts_with("FileV");
         let is_comment = is_header || line.starts_with("//");
         let wrong = || Wrong::new(at, "object", id, "a hexadecimal number");
         return if is_comment { Ok(None) } else { Err(wrong()) };
-    };
-    if id == 0 {
+    }
+    let id = number.map_or((0, id), |number| (number, ""));
+    if id == (0, "") {
         let mut pairs = parts.filter_map(|part| part.split_once('='));
         return pairs.try_for_each(|(key, value)| global(sink, scene, key, value)).map(|()| None);
     }
@@ -103,8 +112,9 @@ fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<F
     for part in parts {
         match part.split_once('=') {
             Some(("T", value)) => place = Some(value),
-            Some(("Name" | "CallSign" | "Pilot", value)) if object.name.is_none() => {
-                object.name = Some(value.replace("\\,", ","));
+            Some(("Name", value)) => object.name = Some(value.replace("\\,", ",")),
+            Some(("CallSign" | "Pilot", value)) if object.pilot.is_none() => {
+                object.pilot = Some(value.replace("\\,", ","));
             }
             Some(("Type", value)) => object.is_aside = !value.starts_with("Air"),
             _ => {}
@@ -113,7 +123,10 @@ fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<F
     let Some(place) = place else { return Ok(None) };
     let track = *object.track.get_or_insert_with(|| {
         let track = u32::try_from(sink.fixes.names.len()).unwrap_or(u32::MAX);
-        sink.fixes.names.push(object.name.clone().unwrap_or_else(|| format!("{id:x}")));
+        let names = [&object.name, &object.pilot].into_iter().flatten();
+        let names: Vec<&str> = names.map(String::as_str).filter(|name| !name.is_empty()).collect();
+        let bare = if id.1.is_empty() { format!("{:x}", id.0) } else { id.1.to_owned() };
+        sink.fixes.names.push(if names.is_empty() { bare } else { names.join(", ") });
         track
     });
     if object.is_aside {
@@ -131,7 +144,7 @@ fn record(sink: &mut Sink<'_>, scene: &mut Scene, line: &str) -> Result<Option<F
     Ok(Some(fix))
 }
 
-fn global(sink: &Sink<'_>, scene: &mut Scene, key: &str, value: &str) -> Result<(), Wrong> {
+fn global(sink: &Sink<'_>, scene: &mut Scene<'_>, key: &str, value: &str) -> Result<(), Wrong> {
     match key {
         "ReferenceTime" => {
             let at = sink.text.offset(value);
