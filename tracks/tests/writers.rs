@@ -54,6 +54,10 @@ fn writers_have_their_own_ways() {
         .replace("<TimeStamp><when>", "<TimeSpan><begin>")
         .replace("</when></TimeStamp>", "</begin><end>2025-01-01T00:00:00Z</end></TimeSpan>");
     is_the_climb(spans.as_bytes(), Format::Kml);
+    let pieces = spans
+        .replace("<Point>", "<LineString>")
+        .replace("</coordinates></Point>", " 11,46,0</coordinates></LineString>");
+    is_the_climb(pieces.as_bytes(), Format::Kml);
     let dashes = samples::igc().replace("HFDTEDATE:150724", "HFDTEDATE: 15-07-24");
     is_the_climb(dashes.replace("\nB", "\n B").as_bytes(), Format::Igc);
 }

@@ -30,6 +30,7 @@ struct Open {
     begin: Option<Piece>,
     /// The altitude mode of what is read, not of lines or views beside it.
     mode: Option<String>,
+    line_mode: Option<String>,
     is_point: bool,
     /// Within a line or an area.
     is_line: bool,
@@ -123,6 +124,7 @@ fn piece(state: &mut State, name: &str, text: &str, at: usize) {
         "altitudeMode" if !open.is_line || open.seconds.is_some() => {
             open.mode = Some(text.to_owned());
         }
+        "altitudeMode" => open.line_mode = Some(text.to_owned()),
         "name" => text.clone_into(&mut state.name),
         "when" => open.times.push(value),
         "begin" => open.begin = Some(value),
@@ -149,6 +151,14 @@ fn placemark(sink: &mut Sink<'_>, state: &mut State, mut open: Open) -> Result<(
         open.places = words_of(line);
         let track = named(sink, &state.name);
         return add(sink, state, track, &open);
+    }
+    let line = open.line.as_ref().map(words_of).unwrap_or_default();
+    if let (Some(begin), [first, _], false) = (&open.begin, line.as_slice(), open.is_point) {
+        // A track in pieces, each with a span of time: it begins where the last one ended.
+        let (times, places) = (vec![begin.clone()], vec![first.clone()]);
+        let piece = Open { times, places, mode: open.line_mode, ..Open::default() };
+        let track = *state.points.get_or_insert_with(|| named(sink, ""));
+        return add(sink, state, track, &piece);
     }
     state.timeless += usize::from(open.line.is_some());
     if !open.is_point {
