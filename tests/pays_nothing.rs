@@ -5,35 +5,10 @@
 //! Keeps: a count of allocations.
 //! Not here: the same for bare graphs (`jobs/tests`).
 
+mod counting;
+
 use overfly::core::frame::{FrameInput, FrameOutput};
 use overfly::{DrawColumns, Overfly, VertexColumns, config, replay};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 /// Flies a stretch and returns (frames with page arrivals, splits, allocations inside frames).
 fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
@@ -48,14 +23,14 @@ fn fly(workers: usize, warm_up: usize, frames: usize) -> (u32, u32, u64) {
         input.views.clear();
         input.views.push(replay::view_of(pose, &scene.views[0], [1280, 720], &scene.body));
         loader.fetch(&output.wanted, &mut input.arrived);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = counting::allocations();
         overfly.frame(&mut input, &mut output).unwrap();
         overfly.columns(&output, 0, &mut draws).unwrap();
         // While it warms up, as a renderer that comes late.
         let slots = if index < warm_up { &draws.slot } else { &output.built };
         overfly.vertices(slots, &mut vertices).unwrap();
         if index >= warm_up {
-            allocations += ALLOCATIONS.load(Ordering::Relaxed) - before;
+            allocations += counting::allocations() - before;
             with_pages += u32::from(output.counts.admitted > 0);
             splits += output.counts.splits;
         }

@@ -18,10 +18,10 @@
  * the north pole. Heights are above the ellipsoid unless a name says otherwise.
  *
  * Threads. Calls on one terrain are for one thread at a time, whichever: another one gets OVF_BUSY
- * and does not wait. So are calls on one renderer, but that ovf_renderer_record_range may be in
- * several; ovf_renderer_record_uploads is a call on the terrain as well. For any thread at any time
- * are ovf_terrain_work, _run_task and _load_page, all of ovf_ground_*, ovf_last_error and
- * ovf_version.
+ * and does not wait. So are calls on one renderer, but that ovf_renderer_record_range and
+ * _record_overlay may be in several; ovf_renderer_record_uploads is a call on the terrain as well.
+ * For any thread at any time are ovf_terrain_work, _run_task and _load_page, all of ovf_ground_*,
+ * ovf_last_error and ovf_version.
  *
  * Vulkan is the host's: none of it is needed to build or link this, nor to run it without
  * ovf_renderer. What can be looked at is checked; for the rest the host vouches. Its handles are
@@ -145,6 +145,21 @@
  * `ovf_limits.depth_order`: 0 is nearest; depth is cleared to 1, and what is less is drawn.
  */
 #define OVF_DEPTH_FORWARD 1
+
+/**
+ * `ovf_overlay_shape.kind`: a line, 1.25 pixels wide.
+ */
+#define OVF_SHAPE_LINE 0
+
+/**
+ * `ovf_overlay_shape.kind`: a filled rectangle.
+ */
+#define OVF_SHAPE_RECTANGLE 1
+
+/**
+ * `ovf_overlay_shape.kind`: text.
+ */
+#define OVF_SHAPE_TEXT 2
 
 /**
  * `ovf_picture.show`: the ground as one would see it.
@@ -1046,6 +1061,99 @@ typedef struct ovf_host_frame {
 } ovf_host_frame;
 
 /**
+ * A shape on a picture. Pixels go right and down from the picture's top left corner.
+ */
+typedef struct ovf_overlay_shape {
+  /**
+   * `sizeof(ovf_overlay_shape)`.
+   */
+  uint32_t struct_size;
+  /**
+   * `OVF_SHAPE_…`.
+   */
+  uint32_t kind;
+  /**
+   * One end of a line; the top left corner of a rectangle or text; within 1e6 pixels.
+   */
+  float at_px[2];
+  /**
+   * The other end of a line; nobody reads it elsewhere.
+   */
+  float to_px[2];
+  /**
+   * Width and height of a rectangle, 0 to 1e6; nobody reads it elsewhere.
+   */
+  float size_px[2];
+  /**
+   * Red, green, blue with the sRGB curve; opacity.
+   */
+  uint8_t srgba[4];
+  /**
+   * Of text: its letters stand in cells of 8 by 8 pixels times this, above 0 up to 1000.
+   */
+  float scale;
+  /**
+   * Of text: Latin letters in UTF-8; a line feed begins a line. What the font lacks is a question
+   * mark.
+   */
+  const char *text;
+} ovf_overlay_shape;
+
+/**
+ * A line in the scene.
+ */
+typedef struct ovf_overlay_segment {
+  /**
+   * `sizeof(ovf_overlay_segment)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Red, green, blue with the sRGB curve; opacity.
+   */
+  uint8_t srgba[4];
+  /**
+   * One end, within 1e12 m.
+   */
+  double a_ecef_m[3];
+  /**
+   * The other one.
+   */
+  double b_ecef_m[3];
+} ovf_overlay_segment;
+
+/**
+ * What is drawn over a picture: first the segments, then the shapes, each in order. None of it is
+ * hidden by the ground. What goes beyond 65 536 triangles is not drawn: lines and rectangles are two
+ * each, a letter some forty.
+ */
+typedef struct ovf_overlay {
+  /**
+   * `sizeof(ovf_overlay)`.
+   */
+  uint32_t struct_size;
+  /**
+   * How many shapes, at most 32 768.
+   */
+  uint32_t shape_count;
+  /**
+   * They; may be null where there are none.
+   */
+  const struct ovf_overlay_shape *shapes;
+  /**
+   * How many segments, at most 32 768.
+   */
+  uint32_t segment_count;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+  /**
+   * They; may be null where there are none.
+   */
+  const struct ovf_overlay_segment *segments;
+} ovf_overlay;
+
+/**
  * What a picture shows.
  */
 typedef struct ovf_picture {
@@ -1065,6 +1173,10 @@ typedef struct ovf_picture {
    * `OVF_BACKDROP_…`.
    */
   uint32_t backdrop;
+  /**
+   * What `ovf_renderer_record_overlay` draws over it; null is nothing. Read during the call.
+   */
+  const struct ovf_overlay *overlay;
 } ovf_picture;
 
 /**
@@ -1656,6 +1768,17 @@ ovf_status ovf_renderer_note_lost(struct ovf_renderer renderer);
  * Device memory that a renderer takes now.
  */
 ovf_status ovf_renderer_memory(struct ovf_renderer renderer, struct ovf_device_memory *memory);
+
+/**
+ * Records the overlay of the picture that `ovf_renderer_record_uploads` was given last with this
+ * index, over whatever was drawn, in the subpass that the renderer was made for; nothing where it
+ * had none. Depth is neither read nor written. The picture's top left corner is at `left_px`,
+ * `top_px`, as for `ovf_renderer_record_range`, which says what is set otherwise afterwards.
+ */
+ovf_status ovf_renderer_record_overlay(struct ovf_renderer renderer,
+                                       const struct ovf_host_frame *frame,
+                                       int32_t left_px,
+                                       int32_t top_px);
 
 /**
  * Makes a picture of the terrain's last frame ready and records the copies of what is new, with

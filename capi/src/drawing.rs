@@ -3,10 +3,12 @@
 //! In:    renderers, command buffers, what to show; a view and a depth range.
 //! Out:   uploads and draws recorded; [`ovf_draw_report`]; projections for the host's own geometry.
 //! Keeps: nothing.
-//! Not here: making renderers (`renderer`), calls of Vulkan (`vulkan`).
+//! Not here: making renderers (`renderer`), what is over a picture (`overlay`), calls of Vulkan
+//!        (`vulkan`).
 
 use crate::border::{Caller, answer};
 use crate::columns::view_of;
+use crate::overlay::{check, fill, ovf_overlay};
 use crate::renderer::{alone, ovf_renderer, shared};
 use crate::status::{Fault, OVF_VULKAN, ovf_status};
 use crate::terrain::{ovf_terrain, with};
@@ -62,6 +64,8 @@ pub struct ovf_picture {
     pub show: u32,
     /// `OVF_BACKDROP_…`.
     pub backdrop: u32,
+    /// What `ovf_renderer_record_overlay` draws over it; null is nothing. Read during the call.
+    pub overlay: *const ovf_overlay,
 }
 
 /// How much work a picture is.
@@ -110,6 +114,7 @@ pub unsafe extern "C" fn ovf_renderer_record_uploads(
         let frame = frame_of(caller, frame)?;
         let picture = caller.sized("picture", picture)?;
         let (show, backdrop) = (show_of(picture.show)?, backdrop_of(picture.backdrop)?);
+        check(caller, picture.overlay)?;
         let done = alone(renderer, |drawn, place| {
             check_index(frame.index, drawn.settings().frames_in_flight)?;
             with(place.terrain, |state| {
@@ -117,6 +122,7 @@ pub unsafe extern "C" fn ovf_renderer_record_uploads(
                 place.news.tell(drawn);
                 let looks = state.overfly.looks_mut();
                 (looks.show, looks.backdrop) = (show, backdrop);
+                fill(caller, picture.overlay, &mut looks.overlay)?;
                 let (overfly, output) = (&mut state.overfly, &state.output);
                 let record = |picture: &Picture<'_>| uploads(caller, drawn, frame, picture);
                 let recorded = overfly.with_picture(output, picture.view as usize, record);
@@ -153,16 +159,10 @@ pub unsafe extern "C" fn ovf_renderer_record_range(
 ) -> ovf_status {
     answer!(|caller: &Caller| {
         let frame = frame_of(caller, frame)?;
-        for (name, found) in [("left_px", left_px), ("top_px", top_px)] {
-            if found < 0 {
-                let most = i32::MAX;
-                let sentence = format!("{name} is {found}, allowed is 0 to {most}");
-                return Err(Fault::invalid(sentence));
-            }
-        }
+        let at_px = check_corner(left_px, top_px)?;
         shared(renderer, |drawn| {
             check_index(frame.index, drawn.settings().frames_in_flight)?;
-            Ok(record_range(caller, drawn, frame, (range, [left_px, top_px]))?)
+            Ok(record_range(caller, drawn, frame, (range, at_px))?)
         })
     })
 }
@@ -194,7 +194,20 @@ pub unsafe extern "C" fn ovf_terrain_projection(
     })
 }
 
-fn check_index(index: u32, frames: u32) -> Result<(), Fault> {
+/// Where a picture stands on a target, which it does not leave at its top left.
+pub fn check_corner(left_px: i32, top_px: i32) -> Result<[i32; 2], Fault> {
+    for (name, found) in [("left_px", left_px), ("top_px", top_px)] {
+        if found < 0 {
+            let most = i32::MAX;
+            let sentence = format!("{name} is {found}, allowed is 0 to {most}");
+            return Err(Fault::invalid(sentence));
+        }
+    }
+    Ok([left_px, top_px])
+}
+
+/// Whether a renderer has such a frame in flight.
+pub fn check_index(index: u32, frames: u32) -> Result<(), Fault> {
     if index < frames {
         return Ok(());
     }

@@ -21,6 +21,7 @@ pub mod drawing;
 pub mod frame;
 pub mod ground;
 pub mod host;
+pub mod overlay;
 pub mod queries;
 pub mod rays;
 pub mod recording;

@@ -91,6 +91,17 @@ pub fn range(
     unsafe { renderer.record_range(frame, range as usize, at_px) }
 }
 
+/// Records the overlay of the picture that was uploaded last.
+pub fn overlay(
+    _: &Caller,
+    renderer: &HostRenderer,
+    frame: HostFrame,
+    at_px: [i32; 2],
+) -> Result<(), DrawError> {
+    // SAFETY: as for a range.
+    unsafe { renderer.record_overlay(frame, at_px) }
+}
+
 /// Refuses a handle that is null.
 pub fn refuse_null(name: &str, handle: *mut c_void) -> Result<(), Fault> {
     let fault = || Fault::new(OVF_NULL_POINTER, format!("{name} is null"));

@@ -8,40 +8,16 @@
 #[path = "contracts/calls.rs"]
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod calls;
+#[path = "../../tests/counting.rs"]
+mod counting;
 
 use calls::*;
+use counting::allocations;
 use overfly_c::ground::*;
 use overfly_c::queries::*;
 use overfly_c::rays::*;
 use overfly_c::status::*;
 use overfly_c::terrain::ovf_terrain_destroy;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 const PLACES: usize = 1000;
 
@@ -70,11 +46,11 @@ fn a_thread_allocates_nothing_from_its_second_question_on() {
     let lat_rad: Vec<f64> = (0..PLACES).map(|i| -1.5 + 0.003 * i as f64).collect();
     let mut height_m = vec![0.0; PLACES];
     ask(ground, &lat_rad, &mut height_m);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocations();
     for _ in 0..20 {
         ask(ground, &lat_rad, &mut height_m);
     }
-    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    assert_eq!(allocations() - before, 0);
     assert!(height_m.iter().all(|height| height.is_finite()));
     must(ovf_ground_destroy(ground));
     must(ovf_terrain_destroy(terrain));

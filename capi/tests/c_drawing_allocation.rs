@@ -1,6 +1,6 @@
 //! Frames and their pictures allocate nothing once warm, with a renderer that C holds.
 //!
-//! In:    a terrain that stands still, a counting allocator; a Vulkan device, or none.
+//! In:    a terrain that stands still, text over it, a counting allocator; a Vulkan device, or none.
 //! Out:   passes or fails; skipped by name without a device, unless `OVERFLY_REQUIRE_GPU` is 1.
 //! Keeps: a count of allocations.
 //! Not here: questions to the ground (`c_allocation`), frames that fetch pages.
@@ -8,47 +8,24 @@
 #[path = "contracts/calls.rs"]
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod calls;
+#[path = "../../tests/counting.rs"]
+mod counting;
 #[path = "contracts/lent.rs"]
 #[expect(dead_code, reason = "the other tests use the rest")]
 mod lent;
 
 use calls::*;
+use counting::allocations;
 use lent::host_vulkan::canvas::Canvas;
 use lent::host_vulkan::host::Host;
 use lent::*;
 use overfly::config;
 use overfly::render_vk::RendererSettings;
 use overfly_c::drawing::ovf_picture;
+use overfly_c::overlay::*;
 use overfly_c::renderer::ovf_renderer_destroy;
 use overfly_c::terrain::ovf_terrain_destroy;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::rc::Rc;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 // One test in this binary: the count is of the whole process.
 #[test]
@@ -63,14 +40,17 @@ fn frames_and_pictures_allocate_nothing_once_warm() {
     let mut canvas = Canvas::new(&host, SIZE_PX, &settings).unwrap();
     let terrain = open_small(Some(&waiting()));
     let renderer = renderer_of(terrain, &canvas);
+    let text = c"steady".as_ptr();
+    let shape = ovf_overlay_shape { kind: OVF_SHAPE_TEXT, scale: 1.0, text, ..sized() };
+    let overlay = ovf_overlay { shape_count: 1, shapes: &raw const shape, ..sized() };
     let step = |canvas: &mut Canvas, frame: usize| {
         fly_views(terrain, frame, &[dive(0)], None);
-        draw_in_c(canvas, renderer, ovf_picture { ..sized() }).draws
+        draw_in_c(canvas, renderer, ovf_picture { overlay: &raw const overlay, ..sized() }).draws
     };
     let warm: u32 = (0..40).map(|frame| step(&mut canvas, frame)).sum();
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocations();
     let draws: u32 = (40..60).map(|frame| step(&mut canvas, frame)).sum();
-    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    assert_eq!(allocations() - before, 0);
     assert!(warm > 0 && draws > 1000, "{warm}, {draws}");
     host.wait_idle().unwrap();
     must(ovf_renderer_destroy(renderer));

@@ -5,40 +5,16 @@
 //! Keeps: a count of allocations.
 //! Not here: lists of pages and collision patches, which allocate and say so.
 
+#[path = "../../tests/counting.rs"]
+mod counting;
 mod ground_rig;
 
+use counting::allocations;
 use glam::DVec3;
 use ground_rig::*;
 use overfly_core::geodesy::{Ecef, Geodetic};
 use overfly_core::ground::{Answer, CollisionPatch, Ground, Query, Refraction, Region};
 use overfly_core::units::Metres;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 /// One of each question; how many had an answer.
 fn ask(ground: &Ground, region: Region, seed: u64, patch: &mut CollisionPatch) -> u32 {
@@ -72,8 +48,8 @@ fn no_question_allocates() {
     let ground = ground_of(&pages_of(&generator, region, 26), true);
     let mut patch = CollisionPatch::new();
     assert_eq!(ask(&ground, region, 0, &mut patch), 19);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = allocations();
     let answered: u32 = (1..200).map(|seed| ask(&ground, region, seed, &mut patch)).sum();
-    let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
+    let allocations = allocations() - before;
     assert_eq!((answered, allocations), (199 * 19, 0));
 }

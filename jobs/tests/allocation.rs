@@ -6,38 +6,14 @@
 //! Keeps: a count of calls, from all threads of this test's process.
 //! Not here: anything else; the replaced allocator is why this is a binary of its own.
 
+#[path = "../../tests/counting.rs"]
+mod counting;
+
+use counting::allocations;
 use overfly_jobs::{Graph, Span, Task, Team, WorkerOptions, Workers};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
-
-struct Counting;
-
-static CALLS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every method passes its arguments on to `System`, whose contract is the same.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps `alloc`'s contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn realloc(&self, old: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps `realloc`'s contract.
-        unsafe { System.realloc(old, layout, new_size) }
-    }
-
-    unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps `dealloc`'s contract.
-        unsafe { System.dealloc(old, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn work(sum: &AtomicU64, team: &Team) {
     team.for_each_index(64, |_| _ = sum.fetch_add(1, Ordering::Relaxed));
@@ -104,9 +80,9 @@ fn a_warm_run_allocates_nothing() {
             for _ in 0..20 {
                 graph.run(&sum, workers).unwrap();
             }
-            let before = CALLS.load(Ordering::Relaxed);
+            let before = allocations();
             frames(&mut graph, &sum, workers);
-            let calls = CALLS.load(Ordering::Relaxed) - before;
+            let calls = allocations() - before;
             assert_eq!(calls, 0, "crew {index}, records {records}");
             assert_eq!(sum.into_inner(), 220 * (209 * 64 + 320));
         }

@@ -5,44 +5,20 @@
 //! Keeps: a count of allocations.
 //! Not here: the device's memory (`steady`), what drivers allocate.
 
+#[path = "../../tests/counting.rs"]
+mod counting;
 mod planet;
 #[expect(dead_code, reason = "settings and skipping only: there is a planet to draw")]
 mod stage;
 
+use counting::allocations;
 use glam::DVec3;
 use overfly_core::scene::FrameParts;
 use overfly_core::settings::VertexPrecision;
 use overfly_jobs::Team;
 use overfly_render_vk::{Overlay, Picture, RendererSettings, Show};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const SIZE_PX: [u32; 2] = [64, 48];
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps this function's contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 #[test]
 fn pictures_allocate_nothing_after_the_first_ones() {
@@ -70,8 +46,8 @@ fn pictures_allocate_nothing_after_the_first_ones() {
         };
         // Twice, because there are two frames in flight.
         (0..2).for_each(|_| Show::ALL.into_iter().for_each(&mut draw));
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         (0..4).for_each(|_| Show::ALL.into_iter().for_each(&mut draw));
-        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0, "{vertices:?}");
+        assert_eq!(allocations() - before, 0, "{vertices:?}");
     }
 }

@@ -5,10 +5,13 @@
 //! Keeps: nothing.
 //! Not here: the header's making (`capi/tests/contracts/header.rs`).
 
-use crate::steps::{Step, Stopped, run};
+use crate::steps::{Step, Stopped, run, target};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+/// A library with ours in it and nothing else.
+const PROBE: &str = "extern crate overfly_c;\n";
 
 /// What `cargo xtask capi` was asked for.
 pub struct Install {
@@ -17,6 +20,11 @@ pub struct Install {
 }
 
 impl Install {
+    /// The debug build, below `prefix`.
+    pub fn debug(prefix: PathBuf) -> Self {
+        Self { prefix, dev: true }
+    }
+
     /// Reads the words after `capi`.
     pub fn parse(words: &[&str]) -> Result<Self, String> {
         match *words {
@@ -28,13 +36,13 @@ impl Install {
 
     /// Builds, then copies.
     pub fn install(&self, root: &Path, cargo: &str) -> Result<(), Stopped> {
-        let profile: &[&str] = if self.dev { &[] } else { &["--release"] };
+        // Beside Python's, whose crates have some features more: so both take the same builds.
+        let profile: &[&str] = if self.dev { &["-p", "overfly-python"] } else { &["--release"] };
         let why = "liboverfly_c, shared and static";
         let build = Step::new("build", why, cargo).with(&["build", "-p", "overfly-capi"]);
         run(root, &build.with(profile))?;
-        let target = std::env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
-        let built = root.join(target).join(if self.dev { "debug" } else { "release" });
-        let system = system_libraries(root, cargo, profile);
+        let built = target(root).join(if self.dev { "debug" } else { "release" });
+        let system = system_libraries(&built);
         self.copy(root, &built, &system).map_err(|error| Stopped {
             step: "install".into(),
             what: format!("could not write to {}: {error}", self.prefix.display()),
@@ -85,11 +93,18 @@ fn pkg_config(prefix: &str, system: &str) -> String {
     )
 }
 
-/// What a program needs beside the static library, as rustc says it; nothing where it does not.
-fn system_libraries(root: &Path, cargo: &str, profile: &[&str]) -> String {
-    let mut command = Command::new(cargo);
-    command.current_dir(root).args(["rustc", "-p", "overfly-capi", "--lib"]).args(profile);
-    command.args(["--crate-type", "staticlib", "--", "--print", "native-static-libs"]);
+/// What a program needs beside the static library, as rustc says it of a library that has ours in
+/// it; nothing where it does not.
+fn system_libraries(built: &Path) -> String {
+    let out = built.join("overfly_c_link");
+    if fs::create_dir_all(&out).is_err() || fs::write(out.join("in.rs"), PROBE).is_err() {
+        return String::new();
+    }
+    let mut command = Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into()));
+    command.args(["--edition=2024", "--crate-type=staticlib", "--print=native-static-libs", "-L"]);
+    command.arg(format!("dependency={}", built.join("deps").display())).arg("--extern");
+    command.arg(format!("overfly_c={}", built.join("liboverfly_c.rlib").display()));
+    command.arg("-o").arg(out.join("out.a")).arg(out.join("in.rs"));
     let said = command.output().map(|done| done.stderr).unwrap_or_default();
     let said = String::from_utf8_lossy(&said).into_owned();
     let line = said.lines().find_map(|line| line.split_once("native-static-libs: "));

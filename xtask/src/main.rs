@@ -1,4 +1,4 @@
-//! Set-up, checks and results: `cargo xtask demo`, `test`, `trade`, `python`.
+//! Set-up, checks and results: `cargo xtask demo`, `test`, `examples`, `trade` and others.
 //!
 //! In:    one word on the command line.
 //! Out:   what is done, why, how long it took, and an exit code.
@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod capi;
+mod examples;
 mod python;
 mod set_up;
 mod steps;
@@ -15,7 +16,7 @@ mod trade;
 use set_up::{DRAWING, VALIDATION, Vulkan, set_up};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use steps::{Step, Stopped, run, run_tests};
+use steps::{Step, Stopped, run, run_tests, target};
 
 const USAGE: &str = "\
 usage: cargo xtask <command>
@@ -23,6 +24,8 @@ usage: cargo xtask <command>
 commands:
   demo   sets up drawing, builds overfly and flies two flights; pictures go to out/demo
   test   sets up drawing with Vulkan's validation layers and runs every test
+  examples
+         builds and runs the examples in C, C++ and Python against what is installed for them
   trade  measures what settings cost over the three flights, into docs/trade.md
   capi --prefix DIR [--dev]
          builds the library for C and installs it below DIR, with header and pkg-config file
@@ -38,6 +41,9 @@ fn main() -> ExitCode {
     let done = match words[..] {
         ["demo"] => demo(&root()),
         ["test"] => test(&root()),
+        ["examples"] => {
+            examples::examples(&root(), &cargo(), set_up(&[DRAWING, VALIDATION].concat()))
+        }
         ["trade"] => trade::trade(&root(), &cargo(), &overfly(&root()).display().to_string()),
         ["capi", ref words @ ..] => match capi::Install::parse(words) {
             Ok(install) => install.install(&root(), &cargo()),
@@ -49,7 +55,7 @@ fn main() -> ExitCode {
             Ok(())
         }
         [] => return refuse("a command is missing"),
-        ["demo" | "test" | "trade" | "python" | "help", ..] => {
+        ["demo" | "test" | "examples" | "trade" | "python" | "help", ..] => {
             return refuse("a command takes no arguments");
         }
         [word, ..] => return refuse(&format!("there is no command {word}")),
@@ -81,9 +87,8 @@ fn cargo() -> String {
 
 /// Where cargo puts the release build of `overfly`.
 fn overfly(root: &Path) -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     let name = format!("overfly{}", std::env::consts::EXE_SUFFIX);
-    root.join(target).join("release").join(name)
+    target(root).join("release").join(name)
 }
 
 fn demo(root: &Path) -> Result<(), Stopped> {

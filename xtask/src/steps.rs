@@ -3,11 +3,11 @@
 //! In:    a [`Step`]: name, reason, command.
 //! Out:   its output as it comes, the elapsed time, or how it [`Stopped`].
 //! Keeps: nothing.
-//! Not here: which steps there are (`main`, `set_up`).
+//! Not here: which steps there are (`main`, `set_up` and the other files).
 
 use std::fmt::{self, Display, Formatter};
 use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Instant;
 
@@ -73,12 +73,29 @@ impl Display for Stopped {
     }
 }
 
+/// Where cargo builds to.
+pub fn target(root: &Path) -> PathBuf {
+    root.join(std::env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from))
+}
+
 /// Runs a step in `folder` and prints how long it took.
 pub fn run(folder: &Path, step: &Step) -> Result<(), Stopped> {
     step.announce();
     let start = now();
     let status = step.command(folder).status();
     conclude(step, start, status)
+}
+
+/// Runs a step; where it fails also what it said on its standard error.
+pub fn run_heard(folder: &Path, step: &Step) -> Result<(), (Stopped, String)> {
+    step.announce();
+    let start = now();
+    let child = step.command(folder).stderr(Stdio::piped()).spawn();
+    let done = child.and_then(std::process::Child::wait_with_output);
+    let said = done.as_ref().map(|done| String::from_utf8_lossy(&done.stderr).into_owned());
+    let said = said.unwrap_or_default();
+    eprint!("{said}");
+    conclude(step, start, done.map(|done| done.status)).map_err(|stopped| (stopped, said))
 }
 
 /// Runs a step that prints cargo's test results, and prints their sum.
@@ -182,5 +199,8 @@ mod tests {
         assert!(run(here, &Step::new("true", "a test", "true")).is_ok());
         let absent = run(here, &Step::new("absent", "a test", "no-such-program")).unwrap_err();
         assert!(absent.to_string().contains("could not run no-such-program"), "{absent}");
+        let loud = Step::new("loud", "a test", "sh").with(&["-c", "echo why >&2; exit 3"]);
+        let (stopped, said) = run_heard(here, &loud).unwrap_err();
+        assert_eq!((stopped.code, said.as_str()), (3, "why\n"));
     }
 }

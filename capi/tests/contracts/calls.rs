@@ -17,6 +17,7 @@ use overfly_c::drawing::*;
 use overfly_c::frame::*;
 use overfly_c::ground::*;
 use overfly_c::host::*;
+use overfly_c::overlay::*;
 use overfly_c::queries::*;
 use overfly_c::rays::*;
 use overfly_c::regions::*;
@@ -28,7 +29,7 @@ use std::ffi::{CStr, CString};
 use std::ptr::null;
 
 /// Structs of the border and their sizes here.
-pub const SIZES: [(&str, usize); 31] = [
+pub const SIZES: [(&str, usize); 34] = [
     ("ovf_scene", size_of::<ovf_scene>()),
     ("ovf_edit", size_of::<ovf_edit>()),
     ("ovf_host", size_of::<ovf_host>()),
@@ -47,6 +48,9 @@ pub const SIZES: [(&str, usize); 31] = [
     ("ovf_target", size_of::<ovf_target>()),
     ("ovf_renderer_settings", size_of::<ovf_renderer_settings>()),
     ("ovf_device_memory", size_of::<ovf_device_memory>()),
+    ("ovf_overlay", size_of::<ovf_overlay>()),
+    ("ovf_overlay_shape", size_of::<ovf_overlay_shape>()),
+    ("ovf_overlay_segment", size_of::<ovf_overlay_segment>()),
     ("ovf_host_frame", size_of::<ovf_host_frame>()),
     ("ovf_picture", size_of::<ovf_picture>()),
     ("ovf_draw_report", size_of::<ovf_draw_report>()),

@@ -3,7 +3,7 @@
 //! In:    the host of the root's examples, the example in C; a Vulkan device and the Khronos layer.
 //! Out:   test results; skipped by name without a device, unless `OVERFLY_REQUIRE_GPU` is 1.
 //! Keeps: pictures and archives of imagery in folders, thrown away.
-//! Not here: what is refused, and handles (`renderers`).
+//! Not here: what is refused, and handles (`renderers`); what is over a picture (`overlays`).
 
 use super::calls::*;
 use super::examples::{built_with, out_of};
@@ -30,8 +30,8 @@ use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
 /// The façade with a renderer on the host's device, beside which C's is held.
-struct Facade {
-    overfly: Overfly,
+pub struct Facade {
+    pub overfly: Overfly,
     output: FrameOutput,
     canvas: Canvas,
     renderer: HostRenderer,
@@ -62,7 +62,7 @@ impl Facade {
     }
 
     /// A view of the last frame, its corner at `at_px` of the canvas.
-    fn draw(&mut self, (view, at_px): (usize, [i32; 2]), show: Show) -> Vec<u8> {
+    pub fn draw(&mut self, (view, at_px): (usize, [i32; 2]), show: Show) -> Vec<u8> {
         self.overfly.looks_mut().show = show;
         let Self { overfly, output, canvas, renderer } = self;
         let drawn = overfly.with_picture(output, view, |picture| {
@@ -79,16 +79,16 @@ impl Facade {
 }
 
 /// The same terrain twice, each with a renderer and a canvas on one device.
-struct Both {
-    facade: Facade,
-    terrain: ovf_terrain,
-    renderer: ovf_renderer,
-    canvas: Canvas,
+pub struct Both {
+    pub facade: Facade,
+    pub terrain: ovf_terrain,
+    pub renderer: ovf_renderer,
+    pub canvas: Canvas,
     scene: SceneSettings,
 }
 
 impl Both {
-    fn new(scene: SceneSettings) -> Self {
+    pub fn new(scene: SceneSettings) -> Self {
         let host = Rc::new(Host::new().unwrap());
         let facade = Facade::new(&host, &scene, SIZE_PX);
         let canvas = Canvas::new(&host, SIZE_PX, facade.renderer.settings()).unwrap();
@@ -98,7 +98,7 @@ impl Both {
     }
 
     /// Flies a frame of [`dive`]; with a sea or without from here on.
-    fn fly(&mut self, frame: usize, sea: Option<bool>) {
+    pub fn fly(&mut self, frame: usize, sea: Option<bool>) {
         let changed = sea.map(|sea| SceneSettings { sea, ..self.scene.clone() });
         let view = dive_in_rust(frame, &self.scene);
         self.facade.fly(frame as f64 / 60.0, vec![view], changed);
@@ -138,7 +138,7 @@ impl Both {
         assert!(ground > all / 2 && ground < all, "{ground} of {all} pixels");
     }
 
-    fn close(self) {
+    pub fn close(self) {
         let host = Rc::clone(&self.canvas.host);
         self.facade.close();
         must(ovf_renderer_destroy(self.renderer));

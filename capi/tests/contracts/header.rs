@@ -9,7 +9,7 @@ use super::examples::{compiler, folder};
 use std::fs;
 
 /// The sources that are the header, in its order.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "status",
     "scene",
     "host",
@@ -17,6 +17,7 @@ const SOURCES: [&str; 14] = [
     "frame",
     "columns",
     "renderer",
+    "overlay",
     "drawing",
     "ground",
     "queries",
@@ -47,10 +48,10 @@ const HEAD: &str = "\
  * the north pole. Heights are above the ellipsoid unless a name says otherwise.
  *
  * Threads. Calls on one terrain are for one thread at a time, whichever: another one gets OVF_BUSY
- * and does not wait. So are calls on one renderer, but that ovf_renderer_record_range may be in
- * several; ovf_renderer_record_uploads is a call on the terrain as well. For any thread at any time
- * are ovf_terrain_work, _run_task and _load_page, all of ovf_ground_*, ovf_last_error and
- * ovf_version.
+ * and does not wait. So are calls on one renderer, but that ovf_renderer_record_range and
+ * _record_overlay may be in several; ovf_renderer_record_uploads is a call on the terrain as well.
+ * For any thread at any time are ovf_terrain_work, _run_task and _load_page, all of ovf_ground_*,
+ * ovf_last_error and ovf_version.
  *
  * Vulkan is the host's: none of it is needed to build or link this, nor to run it without
  * ovf_renderer. What can be looked at is checked; for the rest the host vouches. Its handles are

@@ -28,6 +28,7 @@ use overfly::render_vk::ash::{self, vk};
 use overfly::render_vk::devices;
 use overfly_c::drawing::*;
 use overfly_c::frame::*;
+use overfly_c::overlay::*;
 use overfly_c::renderer::*;
 use overfly_c::scene::ovf_edit;
 use overfly_c::terrain::*;
@@ -192,6 +193,7 @@ pub fn draw_in_c(
             canvas.clear_depth(buffer);
             must(ovf_renderer_record_range(renderer, &frame, range, 0, 0));
         }
+        must(ovf_renderer_record_overlay(renderer, &frame, 0, 0));
         canvas.host.device.cmd_end_render_pass(buffer);
     }
     canvas.submit().unwrap();

@@ -15,5 +15,6 @@ mod header;
 mod hosts;
 mod junk;
 mod lent;
+mod overlays;
 mod queries;
 mod renderers;
