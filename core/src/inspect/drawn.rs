@@ -115,12 +115,15 @@ impl Terrain {
 }
 
 /// What is left of a vertex's way, metres.
-fn way_of(morph: &PatchMorph, (now_ms, morph_ms): (u32, u32)) -> DVec3 {
+pub(super) fn way_of(morph: &PatchMorph, (now_ms, morph_ms): (u32, u32)) -> DVec3 {
     DVec3::from_array(morph.from_m.map(f64::from)) * f64::from(morph.left(now_ms, morph_ms))
 }
 
 /// Lattice points of a patch, row by row from the apex.
-fn points_of([apex, start, end]: [IVec3; 3], patch_depth: u8) -> impl Iterator<Item = IVec3> {
+pub(super) fn points_of(
+    [apex, start, end]: [IVec3; 3],
+    patch_depth: u8,
+) -> impl Iterator<Item = IVec3> {
     let n = segments(patch_depth).cast_signed();
     let (to_start, to_end) = ((start - apex) / n, (end - apex) / n);
     let cells = (0..=n).flat_map(|row| (0..=row).map(move |column| (row, column)));

@@ -8,6 +8,7 @@
 //! Everything here walks the whole mesh and may allocate: some tens of nanoseconds a patch, for
 //! debug views only.
 
+mod bound;
 mod drawn;
 
 pub use drawn::{DrawnLeaf, DrawnMesh};

@@ -7,7 +7,7 @@
 
 use super::agenda::{Band, Verdict};
 use super::diamonds::{Diamond, DiamondId, Diamonds, leaf_key};
-use super::reach::{cap_of, kids_cap_of, own_cap_of, page_depth, page_is_finest};
+use super::reach::{cap_of, kids_cap_of, own_cap_of, page_depth, page_is_finest, sags_of};
 use super::refine::Rule;
 use super::screen_error::{Horizon, Region, Sight, judge_leaf, judge_parent, priority_px};
 use crate::columns::{Column, Id};
@@ -286,19 +286,32 @@ impl Planet<'_> {
             kids_m = kids_m.min(outer.finer_m);
             finer_m = finer_m.min(outer.finer_m);
         }
-        let kids_cap = kids_cap_of(level, centre);
-        let kids_m = kids_m.min(error_m);
+        let (kids_cap, cap) = (kids_cap_of(level, centre), cap_of(level, centre));
+        let shape = diamonds.shape(id);
+        let own_cap = own_cap_of(normal, shape.corners(), kids_cap);
+        // Ground and vertices lie between low and high, and chords sag.
+        let caps = [own_cap, kids_cap, cap];
+        let [least_m, most_m] = self.horizon.curvature_m;
+        let within_m = |sag: f64| high_m - low_m + sag * most_m * most_m / least_m;
+        let sags = sags_of(normal, &shape, self.lod.patch_depth, caps);
+        error_m = error_m.min(within_m(sags[0]));
+        kids_m = kids_m.min(within_m(sags[1]));
+        finer_m = finer_m.min(within_m(sags[2]));
+        // What is too deep to be made is never drawn.
+        let deeper = self.lod.level_max.saturating_sub(level);
+        let kids_m = if deeper > 0 { kids_m.min(error_m) } else { 0.0 };
+        let finer_m = if deeper > 1 { finer_m.min(kids_m) } else { 0.0 };
         Region {
             normal,
             surface: self.body.surface_from_normal(normal),
-            cap: cap_of(level, centre),
-            own_cap: own_cap_of(normal, diamonds.shape(id).corners(), kids_cap),
+            cap,
+            own_cap,
             kids_cap,
             low_m,
             high_m,
             error_m,
             kids_m,
-            finer_m: finer_m.min(kids_m),
+            finer_m,
             tangent_m: self.horizon.tangent_m(high_m),
         }
     }

@@ -11,6 +11,7 @@ pub mod audit;
 pub mod bins;
 pub mod cover;
 pub mod diamonds;
+mod downward;
 mod margin;
 pub mod reach;
 pub mod refine;

@@ -11,8 +11,10 @@
 //! half-size copies: so the geometric series 2·(√2/2 + √6/4) and 2·(√6/4 + √2/4) bound all
 //! descendants; 1 % is added, so that rounding cannot break the nesting.
 
+use super::diamonds::Shape;
 use crate::datasource::key::PAGE_BITS;
 use crate::lattice::{RADIUS, normal_of};
+use crate::mesh::topology::segments;
 use glam::{DVec3, IVec3};
 
 /// Reach of an even diamond's descendants from its centre.
@@ -69,6 +71,84 @@ pub fn own_cap_of(normal: DVec3, corners: [IVec3; 4], cap: f64) -> f64 {
     let own = normals.iter().fold(0.0, far);
     let is_small = normals.iter().all(|corner| corner.dot(normal) > 0.1);
     if is_small && own < cap { own } else { cap }
+}
+
+/// How far the small triangles of a diamond's leaves, of its kids' and of all finer descendants' sag
+/// below a unit sphere, at most.
+///
+/// On one face of the octahedron all triangles of a level have the same three edges, up to their
+/// sign; those of the next face are their mirror image. What an edge is long along the sphere varies
+/// with the normal, within each part's cap. A plane through points on a sphere sags by half the
+/// squared radius of the circle around them.
+pub fn sags_of(
+    normal: DVec3,
+    shape: &Shape,
+    patch_depth: u8,
+    [own_cap, kids_cap, cap]: [f64; 3],
+) -> [f64; 3] {
+    let norm = shape.centre().as_dvec3().length();
+    let sag = |edges: &[DVec3; 3], cap: f64| {
+        // Along a face the norm changes by less than twice as much as the normal.
+        let radius = (1.0 + 6.0 * cap) / (norm * (1.0 - 2.0 * cap)).max(NORM_MIN);
+        let squares = edges.map(|edge| along_squared(edge, normal, cap));
+        0.5 * radius * radius * around_squared(squares)
+    };
+    let edge = |from: IVec3, to: IVec3| (to - from).as_dvec3() / f64::from(segments(patch_depth));
+    // Halving a triangle twice makes some whose hypotenuse lies across its own.
+    let cut = |leg: DVec3, other: DVec3| [[leg, other, leg - other], [leg, other, leg + other]];
+    let legs = [0, 1].map(|side| {
+        let [apex, start, end] = shape.triangle(side);
+        [edge(apex, start), edge(apex, end)]
+    });
+    let own = legs.map(|[leg, other]| cut(leg, other));
+    let kids = legs.map(|[leg, other]| cut(0.5 * (leg - other), 0.5 * (leg + other)));
+    let most = |triangles: &[[DVec3; 3]], cap: f64| {
+        let images = (0..8).filter_map(|flips| mirror(normal, cap, flips));
+        let sags = images.flat_map(|signs| {
+            triangles.iter().map(move |edges| sag(&edges.map(|edge| edge * signs), cap))
+        });
+        sags.fold(0.0, f64::max)
+    };
+    let (own, kids) = (own.as_flattened(), kids.as_flattened());
+    let own_sag = own.iter().map(|edges| sag(edges, own_cap)).fold(0.0, f64::max);
+    // Grandkids are half-size copies.
+    [own_sag, most(kids, kids_cap), 0.25 * most(own, cap).max(most(kids, cap))]
+}
+
+/// The signs of one of the faces that normals within `cap` lie on: bits of `flips` are axes.
+fn mirror(normal: DVec3, cap: f64, flips: u8) -> Option<DVec3> {
+    let sign = |axis: usize| {
+        let flipped = flips >> axis & 1 == 1;
+        let far = flipped && normal[axis].abs() > cap;
+        (!far).then_some(if flipped { -1.0 } else { 1.0 })
+    };
+    Some(DVec3::new(sign(0)?, sign(1)?, sign(2)?))
+}
+
+/// The square of an edge's part along a sphere, at most, where the normal is within `cap` of `normal`.
+fn along_squared(edge: DVec3, normal: DVec3, cap: f64) -> f64 {
+    let length = edge.length();
+    let up = (edge.dot(normal).abs() - cap * length).max(0.0);
+    length * length - up * up
+}
+
+/// How far the plane through three points on a unit sphere sags below it between them.
+pub fn sag_between(corners: [DVec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    0.5 * around_squared([b - c, c - a, a - b].map(DVec3::length_squared))
+}
+
+/// The squared radius of the least circle around a triangle, from the squares of its sides.
+fn around_squared(sides: [f64; 3]) -> f64 {
+    let [a, b, c] = sides;
+    let longest = a.max(b).max(c);
+    let rest = a + b + c - longest;
+    if rest <= longest {
+        return 0.25 * longest;
+    }
+    let area = 2.0 * (a * b + b * c + c * a) - (a * a + b * b + c * c);
+    // Of all acute triangles with this side the equilateral one needs the largest circle.
+    (a * b * c / area).min(longest / 3.0)
 }
 
 /// Depth of the sample grid whose points are the vertices of level-`level` patches, and the

@@ -24,8 +24,9 @@
 //! with Z a lower bound on z, q is at least each of
 //! - d·cos²θ, θ the angle of the picture's corner: as |z·n − (f·n)·X| = |f×(n×X)| ≤ |X|;
 //! - Z/A, A = |n⊥| + T·|f·n| with the normal's part n⊥ across f and the tangent T of the corner;
-//! - Z²/F, F = min(|z·n − (f·n)·X| at C + 2r + 2εD, D): that vector changes by at most 2|dX| + 2|X||dn|.
+//! - Z²/F, F = min(|f×(n×X)| at C + r + εD, D): that vector changes by at most |dX| + |X||dn|.
 //!
+//! Ground below the eye has a fourth bound (`downward`), which knows what of it is in the picture.
 //! Z is the greater of f·C − r and d·cos θ: what is not in the picture does not count. A lens that
 //! shrinks errors is trusted up to d/max(T, 1/4), so that parents far above the threshold last.
 //! Balls are nested as caps are, so q only grows when a region shrinks.
@@ -35,13 +36,14 @@
 //! below), so d changes by at most λm. Where the threshold over f falls or rises by a share Δ, R
 //! changes by at most RΔ. A plane's value over the region changes by at most m, and by L·φ when its
 //! unit normal changes by φ, L the region's farthest point. The horizon's reach changes with the
-//! tangent length of the eye. Z changes by at most (1+λ)m + Dφ, A by (1+T)φ, F by (2+2ε)m + 2Dφ; so
+//! tangent length of the eye. Z changes by at most (1+λ)m + Dφ, A by (1+T)φ, F by (1+ε)m + Dφ; so
 //! Z − RA changes by at most (1+λ)m + (D + (1+T)R)φ. √(RF) rises by at most √(R/F)/2 times F's change,
 //! and falls by at most 1.2 times as much while F has lost no more than half. D itself changes by m,
 //! which counts as long as m is below D/10. So a slack in metres, divided by what it loses for each
 //! metre, stays positive for as long as `Lasts` tells.
 
 use super::agenda::Verdict;
+use super::downward::Downward;
 use super::margin::{Margin, greater, least};
 use super::wheel::{Family, Lasts, Motion};
 use crate::camera::Camera;
@@ -114,8 +116,10 @@ pub struct Sight {
     corner_cosine2: f64,
     /// Tangent of that angle.
     corner_tangent: f64,
+    half_tangents: [f64; 2],
     near_m: f64,
     tangent_m: f64,
+    downward: Downward,
     /// Greatest √((ρ + k)/(ρ + h)) of any ground k and any eye h for which verdicts last.
     steepness: f64,
     horizon: Horizon,
@@ -144,7 +148,9 @@ impl Sight {
             corner_cosine: (1.0 / camera.corner_factor).sqrt(),
             corner_cosine2: 1.0 / camera.corner_factor,
             corner_tangent: (camera.corner_factor - 1.0).sqrt(),
+            half_tangents: camera.half_tangents,
             near_m: camera.near_m,
+            downward: Downward::new(camera, deepest_m),
             // From below all ground the horizon hides nothing.
             tangent_m: if below { f64::INFINITY } else { horizon.tangent_m(camera.height_m) },
             steepness,
@@ -168,7 +174,9 @@ impl Sight {
         let change = |now: f64, was: f64| (now - was).abs() / now.min(was);
         let zoom = change(self.pixels_per_radian, before.pixels_per_radian)
             + change(self.corner_cosine2, before.corner_cosine2)
-            + change(self.corner_tangent, before.corner_tangent);
+            + change(self.corner_tangent, before.corner_tangent)
+            + change(self.half_tangents[0], before.half_tangents[0])
+            + change(self.half_tangents[1], before.half_tangents[1]);
         let lift_m = if self.tangent_m.is_finite() {
             (self.tangent_m - before.tangent_m).abs()
         } else {
@@ -258,6 +266,8 @@ impl Sight {
         let depth_m = self.forward.dot(away);
         let along = self.forward.dot(region.normal);
         Aim {
+            lower_m: self.height_m - high_m,
+            chord: (self.normal - region.normal).length(),
             tallest_m: greater(low_m.abs(), high_m.abs()),
             half_m: 0.5 * (high_m - low_m),
             away_m: away.length(),
@@ -273,7 +283,7 @@ impl Sight {
         let ball_m = (1.01 * self.horizon.curvature_m[1] + aim.tallest_m) * cap + aim.half_m;
         let far_m = aim.away_m + ball_m;
         let corner_m = distance_m * self.corner_cosine;
-        let seen_m = least(aim.seen_m + 2.0 * ball_m + 2.0 * cap * far_m, far_m);
+        let seen_m = least(aim.seen_m + ball_m + cap * far_m, far_m);
         let aside = least(aim.aside + cap, 1.0);
         let ahead = least(aim.along.abs() + cap, 1.0);
         Lens {
@@ -283,6 +293,8 @@ impl Sight {
             seen_m: greater(seen_m, SHRINK_MIN * far_m),
             far_m,
             cap,
+            lower_m: aim.lower_m,
+            chord: aim.chord + cap,
         }
     }
 
@@ -297,7 +309,8 @@ impl Sight {
         let across_m = lens.depth_m / lens.across;
         let seen_m = lens.depth_m * lens.depth_m / lens.seen_m;
         let most_m = lens.distance_m * self.shrink_max();
-        least(greater(greater(corner_m, across_m), seen_m), most_m)
+        let lens_m = least(greater(greater(corner_m, across_m), seen_m), most_m);
+        greater(lens_m, self.downward.lens_distance_m(lens.lower_m, lens.chord))
     }
 
     /// Error in pixels of a part of a region, and its lens where it is seen.
@@ -373,7 +386,7 @@ impl Sight {
     fn below(&self, lens: &Lens, reach_m: f64, stretch: f64) -> Margin {
         let near = self.margin_of_distance(lens, reach_m, stretch);
         let [corner, across, seen] = self.margins(lens, reach_m, stretch, 1.0);
-        near.and(corner.or(across).or(seen))
+        near.and(corner.or(across).or(seen)).or(self.margin_of_downward(lens, reach_m))
     }
 
     /// For how long a lens distance stays within `reach_m`: as long as each of its bounds does, or
@@ -383,10 +396,15 @@ impl Sight {
         let [corner, across, seen] = self.margins(lens, reach_m, stretch, 1.2).map(Margin::turned);
         let half = Margin {
             slack_m: 0.5 * lens.seen_m,
-            per_m: 2.0 + 2.0 * lens.cap,
-            per_radian_m: 2.2 * lens.far_m,
+            per_m: 1.0 + lens.cap,
+            per_radian_m: 1.1 * lens.far_m,
         };
-        near.or(corner.and(across).and(seen).and(half))
+        let down = self.margin_of_downward(lens, reach_m).turned();
+        near.or(corner.and(across).and(seen).and(half)).and(down)
+    }
+
+    fn margin_of_downward(&self, lens: &Lens, reach_m: f64) -> Margin {
+        self.downward.margin(lens.lower_m, lens.chord, reach_m)
     }
 
     /// By how much the most that a lens may make of the distance is beyond `reach_m`.
@@ -412,7 +430,7 @@ impl Sight {
             per_radian_m: far_m + tangent * reach_m + reach_m * lens.across,
         };
         let root_m = (reach_m * lens.seen_m).sqrt();
-        let slope = steeper * root_m / lens.seen_m;
+        let slope = 0.5 * steeper * root_m / lens.seen_m;
         let seen = Margin {
             slack_m: lens.depth_m - root_m,
             per_m: 1.0 + stretch + slope * (1.0 + lens.cap),
@@ -451,6 +469,10 @@ fn sight((per_m, farthest_m): (f64, f64), slack_m: f64) -> Margin {
 
 /// A region before a view, as far as its parts share it.
 struct Aim {
+    /// How much lower than the eye all of it is, metres.
+    lower_m: f64,
+    /// Chord between the eye's normal and the region's.
+    chord: f64,
     /// Greatest height above or below the ellipsoid, and half their range, metres.
     tallest_m: f64,
     half_m: f64,
@@ -478,6 +500,10 @@ struct Lens {
     far_m: f64,
     /// Chord from the ball's normal to the farthest normal: ε.
     cap: f64,
+    /// How much lower than the eye all of it is, metres.
+    lower_m: f64,
+    /// Chord from the eye's normal to the farthest normal.
+    chord: f64,
 }
 
 /// A lens is never taken to shrink errors by more than this, so that what depends on it changes
@@ -521,6 +547,15 @@ struct Look {
 fn worst_px(parts: &[Option<(f64, Lens)>; PARTS]) -> f64 {
     let errors_px = parts.iter().flatten().map(|part| part.0);
     errors_px.fold(0.0, greater)
+}
+
+/// Error bound of a region's own triangles alone, over all views: what is drawn while it is a leaf.
+pub fn own_px(region: &Region, sights: &[Sight]) -> f64 {
+    let part = |sight: &Sight| {
+        let looks = sight.look(region, sight.distances_m(region));
+        sight.part(&sight.aim(region), &looks[0]).map_or(0.0, |(error_px, _)| error_px)
+    };
+    sights.iter().map(part).fold(0.0, greater)
 }
 
 /// Priority of a region: the largest error over all views.

