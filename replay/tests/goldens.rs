@@ -50,17 +50,17 @@ fn holds(flight: &str, scene: &str, golden: u64) {
 
 #[test]
 fn the_golden_digest_of_rainier_over_the_earth_holds() {
-    holds("rainier", "earth", 0x4d1f_5bda_990b_6386);
+    holds("rainier", "earth", 0xf30f_8b26_d676_7993);
 }
 
 #[test]
 fn the_golden_digest_of_descent_over_the_moon_holds() {
-    holds("descent", "moon", 0xa812_ea7e_fa38_a514);
+    holds("descent", "moon", 0xfea2_6549_6357_01e5);
 }
 
 #[test]
 fn the_golden_digest_of_poles_over_a_small_planet_holds() {
-    holds("poles", "small", 0xd0f9_79ae_00aa_08ef);
+    holds("poles", "small", 0xb51f_0d5c_a0c4_a87b);
 }
 
 /// As above, with vertices on their way from the surface that they refine.
@@ -68,5 +68,5 @@ fn the_golden_digest_of_poles_over_a_small_planet_holds() {
 fn the_golden_digest_of_morphing_vertices_holds() {
     let scene = overfly_config::load("small").unwrap();
     let found = digest_of("descent", &scene, 2400..2600);
-    assert_eq!(found, 0xde92_0b56_1e9f_5a8f, "{found:#x}");
+    assert_eq!(found, 0x2fae_84b0_da11_0598, "{found:#x}");
 }

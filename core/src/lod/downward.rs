@@ -11,10 +11,10 @@
 //! L(p) = −(n⊥·p + n_f): height above a convex body is a convex function, and n is its gradient
 //! at the eye. So ground that is b lower has 1/z ≤ L(p)/b. A vertical error of a metre moves it by
 //! |n⊥ − n_f·p|/z over the screen; normals a chord δ away from the eye's change that by δ·√(1 + p²)/z at
-//! most. With G = max L·|n⊥ − n_f·p| and W = max L·√(1 + p²) over the picture, where L is above 0,
-//! the lens distance is at least b/(G + δW).
+//! most. With G = max L·|n⊥ − n_f·p| over the picture, where L is above 0, C the cosine of the picture's
+//! corner and W = max L/C the lens distance is at least b/(G + δW).
 //!
-//! Certainty. Let C be the cosine of the picture's corner. A change of n by ν changes L and |n⊥ − n_f·p| by
+//! Certainty. A change of n by ν changes L and |n⊥ − n_f·p| by
 //! ν/C, so G by 2ν/C² and W by ν/C²; a metre of way changes n by one over the radius of curvature, and
 //! δ by as much. A rotation that changes the planes' normals by φ is one by √2·φ/C at most. A share of p
 //! changes G by twice that share over C².
@@ -25,7 +25,7 @@ use glam::{DVec2, DVec3};
 
 /// The picture is looked at in squares, this many a side: in each the greatest L counts with the
 /// greatest |n⊥ − n_f·p|.
-const SQUARES: u32 = 16;
+const SQUARES: usize = 8;
 
 /// Verdicts last for no greater turn or drift than this: products of changes stay small.
 const TURN_MAX: f64 = 0.1;
@@ -50,28 +50,34 @@ impl Downward {
         let (across, ahead) =
             (DVec2::new(along(camera.right), along(camera.up)), along(camera.forward));
         let [half_x, half_y] = camera.half_tangents;
-        let point = |column: u32, row: u32| {
-            let share = |index: u32| 2.0 * f64::from(index) / f64::from(SQUARES) - 1.0;
-            DVec2::new(half_x * share(column), half_y * share(row))
+        // L and the squared |n⊥ − n_f·p| at the corners of a row of squares.
+        let corners_of = |row: usize| {
+            let share = |index: usize| 2.0 * index as f64 / SQUARES as f64 - 1.0;
+            core::array::from_fn(|column| {
+                let p = DVec2::new(half_x * share(column), half_y * share(row));
+                [-(across.dot(p) + ahead), (across - ahead * p).length_squared()]
+            })
         };
-        let (mut steepness, mut leaning) = (0.0, 0.0);
-        for (row, column) in (0..SQUARES).flat_map(|row| (0..SQUARES).map(move |c| (row, c))) {
-            let corners = [(0, 0), (1, 0), (0, 1), (1, 1)];
-            let corners = corners.map(|(right, up)| point(column + right, row + up));
-            // Each is convex, so none is greater within a square than at its corners.
-            let most = |of: &dyn Fn(DVec2) -> f64| corners.into_iter().map(of).fold(0.0, greater);
-            let lower = most(&|p| -(across.dot(p) + ahead));
-            let moved = most(&|p| (across - ahead * p).length());
-            let slant = most(&|p| (1.0 + p.length_squared()).sqrt());
-            steepness = greater(steepness, lower * moved);
-            leaning = greater(leaning, lower * slant);
+        let (mut steepest2, mut lowest) = (0.0, 0.0);
+        let mut above: [[f64; 2]; SQUARES + 1] = corners_of(0);
+        for row in 1..=SQUARES {
+            let below: [[f64; 2]; SQUARES + 1] = corners_of(row);
+            for column in 0..SQUARES {
+                let corners = [above[column], above[column + 1], below[column], below[column + 1]];
+                // Both are convex, so neither is greater within a square than at its corners.
+                let [lower, moved2] =
+                    [0, 1].map(|of| corners.map(|c| c[of]).into_iter().fold(0.0, greater));
+                steepest2 = greater(steepest2, lower * lower * moved2);
+                lowest = greater(lowest, lower);
+            }
+            above = below;
         }
         let corner_secant = camera.corner_factor.sqrt();
         // Rounding of L, where the horizon is at the picture's edge.
         let rounding = 1e-12 * camera.corner_factor;
         Self {
-            steepness: steepness + rounding,
-            leaning: leaning + rounding,
+            steepness: steepest2.sqrt() + rounding,
+            leaning: lowest * corner_secant + rounding,
             corner_secant,
             turn_per_m: 1.0 / deepest_m,
         }
