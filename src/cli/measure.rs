@@ -36,7 +36,7 @@ const FRAMES: usize = 600;
 const TEACHES: &str = "\
 Every ray of a measured frame meets the ground itself, in f64 and as fine as the picture can show,
 and the mesh that is drawn. E1, the radial error, is the distance of both on the screen, along the
-vertical; E5 is its maximum over what the LOD promised. docs/accuracy.md says what each metric is.
+vertical; E5 is its maximum over what is certain of the frame. docs/accuracy.md says what each metric is.
 
 In every 30th measured frame the costly metrics are measured as well (E4, C1-C3, H, J1, M32, Z), more
 often where few frames are measured; in every third of those, E1 is found a second way.

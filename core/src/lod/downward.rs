@@ -14,10 +14,9 @@
 //! most. With G = max L·|n⊥ − n_f·p| over the picture, where L is above 0, C the cosine of the picture's
 //! corner and W = max L/C the lens distance is at least b/(G + δW).
 //!
-//! Certainty. A change of n by ν changes L and |n⊥ − n_f·p| by
-//! ν/C, so G by 2ν/C² and W by ν/C²; a metre of way changes n by one over the radius of curvature, and
-//! δ by as much. A rotation that changes the planes' normals by φ is one by √2·φ/C at most. A share of p
-//! changes G by twice that share over C².
+//! Certainty. A change of n by ν changes L and |n⊥ − n_f·p| by ν/C, so G by 2ν/C² and W by ν/C²; a metre
+//! of way changes n by one over the radius of curvature, and δ by as much. A rotation that changes the
+//! planes' normals by φ is one by √2·φ/C at most. A share of p changes G by twice that share over C².
 
 use super::margin::{Margin, greater};
 use crate::camera::Camera;
@@ -103,5 +102,91 @@ impl Downward {
         let most_m = TURN_MAX * margin.per_radian_m;
         let slack_m = margin.slack_m.clamp(-most_m, most_m);
         Margin { slack_m, ..margin }.rounded(greater(lower_m.abs(), reach_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{View, orientation_from_attitude};
+    use crate::digest::mix;
+    use crate::geodesy::{Ecef, Ellipsoid, Geodetic};
+    use crate::units::Radians;
+
+    fn unit(seed: u64) -> f64 {
+        (mix(seed) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Something between 1 and 2^(octaves + 1), mostly amid them.
+    fn spread(seed: u64, octaves: u64) -> f64 {
+        let octave = (0..octaves).filter(|at| unit(seed ^ at << 40) < 0.5).count();
+        f64::from(1_u32 << octave) * (1.0 + unit(seed))
+    }
+
+    /// A camera somewhere, at some attitude, with some lens.
+    fn camera(seed: u64) -> Camera {
+        let random = |at: u64| unit(seed * 16 + at);
+        let at = Geodetic::from_degrees(
+            180.0 * random(0) - 90.0,
+            360.0 * random(1) - 180.0,
+            spread(seed * 16 + 2, 30),
+        );
+        let angle =
+            |share: f64, most_deg: f64| Radians::from_degrees(most_deg * (2.0 * share - 1.0));
+        let [heading, pitch, roll] =
+            [angle(random(3), 180.0), angle(random(4), 90.0), angle(random(5), 60.0)];
+        let view = View {
+            eye: Ellipsoid::WGS84.ecef_from_geodetic(at),
+            orientation: orientation_from_attitude(at, heading, pitch, roll),
+            field_of_view: Radians::from_degrees(1.0 + 119.0 * random(6)),
+            size_px: [1280, 720],
+            near_m: 0.1,
+        };
+        Camera::new(&view, &Ellipsoid::WGS84)
+    }
+
+    #[test]
+    fn no_ground_in_the_picture_shows_more_than_the_lens_distance_says() {
+        let body = Ellipsoid::WGS84;
+        let (mut seen, mut tightest) = (0, 0.0_f64);
+        let rays = (0..4_000).flat_map(|seed| (0..8).map(move |ray| (seed, ray)));
+        for (seed, ray) in rays {
+            let camera = camera(seed);
+            let downward = Downward::new(&camera, 6e6);
+            let share = |axis: u64| 2.0 * unit(seed << 8 | ray << 1 | axis) - 1.0;
+            let p = DVec2::new(share(0), share(1)) * DVec2::from(camera.half_tangents);
+            let z = spread(seed << 9 | ray, 30);
+            let way = (camera.forward + camera.right * p.x + camera.up * p.y) * z;
+            let ground = body.geodetic_from_ecef(Ecef(camera.eye.0 + way));
+            let lower_m = camera.height_m - ground.height_m;
+            // How far a metre upward moves the place on a screen at unit depth.
+            let normal = ground.normal();
+            let across = DVec2::new(normal.dot(camera.right), normal.dot(camera.up));
+            let shown = (across - normal.dot(camera.forward) * p).length() / z;
+            if lower_m > 0.0 {
+                let chord = (normal - camera.normal).length();
+                let lens_m = downward.lens_distance_m(lower_m, chord);
+                assert!(shown * lens_m < 1.0 + 1e-9, "{seed} {ray}: {}", shown * lens_m);
+                tightest = tightest.max(shown * lens_m);
+                seen += 1;
+            }
+        }
+        assert!(seen > 5_000 && tightest > 0.9, "{seen}, {tightest}");
+    }
+
+    #[test]
+    fn a_camera_that_looks_up_sees_nothing_below_itself() {
+        let at = Geodetic::from_degrees(10.0, 20.0, 1000.0);
+        let up =
+            orientation_from_attitude(at, Radians(0.0), Radians::from_degrees(80.0), Radians(0.0));
+        let view = View {
+            eye: Ellipsoid::WGS84.ecef_from_geodetic(at),
+            orientation: up,
+            field_of_view: Radians::from_degrees(10.0),
+            size_px: [720, 720],
+            near_m: 0.1,
+        };
+        let downward = Downward::new(&Camera::new(&view, &Ellipsoid::WGS84), 6e6);
+        assert!(downward.lens_distance_m(1.0, 0.0) > 1e9);
     }
 }

@@ -194,7 +194,7 @@ impl FlightErrors {
             let (e1, at) = (worst.e1_px.max, worst.e1_px.at.pixel);
             faults.push(format!(
                 "E5: the bound did not hold in {} of {} frames; worst in frame {}: {e1:.3} px at \
-                 pixel ({:.0}, {:.0}) where {:.3} px were promised",
+                 pixel ({:.0}, {:.0}) where {:.3} px were certain",
                 over.len(),
                 self.frames.len(),
                 worst.frame,

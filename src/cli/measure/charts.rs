@@ -99,7 +99,7 @@ fn heat(canvas: &mut Canvas, facts: &Facts, worst: &Worst) -> Result<(), Failure
     let (left, top) = (24.0, 80.0);
     let area = canvas.into_drawing_area();
     let title = format!(
-        "E1 in frame {} of {}: rms {:.3}, max {:.3} px; promised {:.3} px",
+        "E1 in frame {} of {}: rms {:.3}, max {:.3} px; certain {:.3} px",
         frame.frame, facts.flight, frame.e1_px.rms, frame.e1_px.max, frame.bound_px
     );
     area.draw(&Text::new(title, (24, 24), LARGE))?;
@@ -168,9 +168,9 @@ fn along(canvas: &mut Canvas, facts: &Facts, errors: &FlightErrors) -> Result<()
         .x_label_formatter(&whole)
         .y_label_formatter(&hundredths)
         .draw()?;
-    let promised = RGBColor(120, 120, 130);
+    let certain = RGBColor(120, 120, 130);
     let series: [(&str, RGBColor, OfFrame); 4] = [
-        ("promised", promised, |frame| frame.bound_px),
+        ("certain", certain, |frame| frame.bound_px),
         ("E1 max", RGBColor(200, 40, 40), |frame| frame.e1_px.max),
         ("E1 p99", RGBColor(220, 150, 30), |frame| frame.e1_px.p99),
         ("E1 rms", RGBColor(30, 90, 180), |frame| frame.e1_px.rms),
@@ -186,7 +186,7 @@ fn along(canvas: &mut Canvas, facts: &Facts, errors: &FlightErrors) -> Result<()
         .position(SeriesLabelPosition::UpperRight)
         .label_font(LEGEND)
         .background_style(WHITE.mix(0.85))
-        .border_style(promised)
+        .border_style(certain)
         .draw()?;
     profile(&lower, errors, along)
 }
