@@ -26,8 +26,7 @@
 //! - Z/A, A = |n⊥| + T·|f·n| with the normal's part n⊥ across f and the tangent T of the corner;
 //! - Z²/F, F = min(|f×(n×X)| at C + r + εD, D): that vector changes by at most |dX| + |X||dn|.
 //!
-//! Ground below the eye has a fourth bound (`downward`), which knows what of it is in the picture.
-//! Z is the greater of f·C − r and d·cos θ: what is not in the picture does not count. A lens that
+//! Ground below the eye has a fourth bound, see `downward`. Z is the greater of f·C − r and d·cos θ: what is not in the picture does not count. A lens that
 //! shrinks errors is trusted up to d/max(T, 1/4), so that parents far above the threshold last.
 //! Balls are nested as caps are, so q only grows when a region shrinks.
 //!
@@ -347,12 +346,17 @@ impl Sight {
         if path_m < most_m { path_m } else { most_m }
     }
 
+    /// The lens distance at which an error is on the threshold, also where that is 0.
+    fn reach_m(&self, error_m: f64, threshold_px: f64) -> f64 {
+        let reach_m = error_m * self.pixels_per_radian / threshold_px;
+        if error_m > 0.0 { least(reach_m, REACH_MAX_M) } else { 0.0 }
+    }
+
     /// For how long a leaf stays below `threshold_px` in this view, or its error.
     fn leaf(&self, region: &Region, threshold_px: f64) -> Verdict {
         let distances_m = self.distances_m(region);
         let parts_m = distances_m.map(|distance_m| greater(distance_m, self.near_m));
-        let reaches_m =
-            errors_of(region).map(|error_m| error_m * self.pixels_per_radian / threshold_px);
+        let reaches_m = errors_of(region).map(|error_m| self.reach_m(error_m, threshold_px));
         let far_m = |part: usize| parts_m[part] - reaches_m[part] / self.corner_cosine2;
         let far_m = least(least(far_m(0), far_m(1)), far_m(2));
         if far_m > 0.0 {
@@ -386,7 +390,8 @@ impl Sight {
     fn below(&self, lens: &Lens, reach_m: f64, stretch: f64) -> Margin {
         let near = self.margin_of_distance(lens, reach_m, stretch);
         let [corner, across, seen] = self.margins(lens, reach_m, stretch, 1.0);
-        near.and(corner.or(across).or(seen)).or(self.margin_of_downward(lens, reach_m))
+        let down = self.downward.margin(lens.lower_m, lens.chord, reach_m);
+        near.and(corner.or(across).or(seen)).or(down)
     }
 
     /// For how long a lens distance stays within `reach_m`: as long as each of its bounds does, or
@@ -399,12 +404,8 @@ impl Sight {
             per_m: 1.0 + lens.cap,
             per_radian_m: 1.1 * lens.far_m,
         };
-        let down = self.margin_of_downward(lens, reach_m).turned();
+        let down = self.downward.margin(lens.lower_m, lens.chord, reach_m).turned();
         near.or(corner.and(across).and(seen).and(half)).and(down)
-    }
-
-    fn margin_of_downward(&self, lens: &Lens, reach_m: f64) -> Margin {
-        self.downward.margin(lens.lower_m, lens.chord, reach_m)
     }
 
     /// By how much the most that a lens may make of the distance is beyond `reach_m`.
@@ -451,7 +452,7 @@ impl Sight {
         let (stretch, farthest_m) = (self.stretch(region), self.farthest_m(region));
         let margin = |part: usize| match &parts[part] {
             Some((error_px, lens)) if *error_px > threshold_px => {
-                let reach_m = looks[part].error_m * self.pixels_per_radian / threshold_px;
+                let reach_m = self.reach_m(looks[part].error_m, threshold_px);
                 let sight = sight((stretch, farthest_m), looks[part].seen_by_m);
                 self.above(lens, reach_m, stretch).and(sight)
             }
@@ -505,6 +506,9 @@ struct Lens {
     /// Chord from the eye's normal to the farthest normal.
     chord: f64,
 }
+
+/// Farther than anything is, and far from overflow.
+const REACH_MAX_M: f64 = 1e60;
 
 /// A lens is never taken to shrink errors by more than this, so that what depends on it changes
 /// slowly.

@@ -278,7 +278,8 @@ impl Wheels {
         ease: &mut impl FnMut(u32, f64) -> bool,
     ) {
         let octave = wheel % OCTAVES;
-        let next = tick(reading, octave) + 1;
+        // A threshold that rises from 0 is an endless drift, which has passed everything.
+        let next = tick(reading, octave).saturating_add(1);
         let slot = slot_of(next);
         if self.slots[wheel] >> slot & 1 == 0 {
             return;
