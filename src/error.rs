@@ -6,9 +6,9 @@
 //! Not here: faults of pages (`sources`) and of requests (`requests`).
 
 use crate::core::camera::ViewFault;
+use crate::drawing::DrawError;
 use crate::jobs::{StagePanic, StartError};
 use crate::record::RecordError;
-use crate::render_vk::DrawError;
 use crate::replay::BUNDLED;
 use crate::sources::SourceError;
 use std::fmt;

@@ -10,23 +10,37 @@
 pub use overfly_archive as archive;
 pub use overfly_config as config;
 pub use overfly_core as core;
-pub use overfly_ingest as ingest;
 pub use overfly_jobs as jobs;
-pub use overfly_render_vk as render_vk;
 pub use overfly_replay as replay;
 
 pub mod columns;
+#[cfg(feature = "vulkan")]
+mod drawing;
+#[cfg(not(feature = "vulkan"))]
+#[path = "undrawn.rs"]
+mod drawing;
 pub mod error;
 pub mod host;
+/// Archives from rasters.
+#[cfg(feature = "ingest")]
+pub mod ingest {
+    pub use overfly_ingest::*;
+}
 pub mod loader;
 mod pages;
 mod record;
+/// Our renderer.
+#[cfg(feature = "vulkan")]
+pub mod render_vk {
+    pub use overfly_render_vk::*;
+}
 mod requests;
 mod resident;
 pub mod sources;
 pub mod surveyor;
 
 pub use columns::{ColumnsFault, DrawColumns, VertexColumns};
+pub use drawing::*;
 pub use error::{ChangeError, FlightError, FrameError, OpenError};
 pub use host::{Host, HostThreads, Pages, Workers};
 pub use record::RecordError;
@@ -39,16 +53,14 @@ struct Readme;
 
 use crate::archive::OpenOptions;
 use crate::core::datasource::{Page, PageKey};
-use crate::core::frame::data::ViewDraws;
 use crate::core::frame::{FrameInput, FrameOutput, Terrain, add_stages};
 use crate::core::geodesy::Geodetic;
 use crate::core::ground::{Ground, Query, Readiness, Region, RegionFault};
-use crate::core::inspect::PatchInfo;
-use crate::core::scene::{FrameParts, extract, world_of};
+use crate::core::scene::world_of;
 use crate::core::settings::SceneSettings;
-use crate::jobs::{Graph, Span, Spans, StageId, Team};
-use crate::render_vk::{Backdrop, DrawError, DrawReport, Overlay, Picture, Renderer, Show};
+use crate::jobs::{Graph, Spans};
 use crate::replay::Flight;
+use drawing::Drawing;
 use loader::Loader;
 use pages::Loading;
 use parking_lot::Mutex;
@@ -61,9 +73,6 @@ use std::path::Path;
 use std::sync::Arc;
 use surveyor::Surveyor;
 
-/// Name of the stage that records and submits the pictures.
-pub const RECORD: Span = Span("render_vk.record");
-
 /// Pages that a surveyor for a flight keeps: 32 MiB.
 const FLIGHT_PAGES: usize = 512;
 
@@ -73,86 +82,11 @@ struct House {
     drawing: Mutex<Drawing>,
 }
 
-/// What pictures show from now on, besides the scene.
-#[derive(Default)]
-pub struct Looks {
-    /// What the ground is coloured by.
-    pub show: Show,
-    /// Drawn over everything.
-    pub overlay: Overlay,
-    /// What is behind the ground.
-    pub backdrop: Backdrop,
-}
-
-#[derive(Default)]
-struct Drawing {
-    renderer: Option<Renderer>,
-    parts: FrameParts,
-    looks: Looks,
-    infos: Vec<PatchInfo>,
-    /// View to draw in this frame, if any.
-    view: Option<usize>,
-    report: Option<Result<DrawReport, DrawError>>,
-}
-
-impl Drawing {
-    /// Draws a view of a terrain, if there is a renderer.
-    fn draw(
-        &mut self,
-        terrain: &Terrain,
-        (view, time_ms): (&ViewDraws, u32),
-        team: &Team<'_>,
-    ) -> Option<Result<DrawReport, DrawError>> {
-        let Self { renderer, parts, looks, infos, .. } = self;
-        let renderer = renderer.as_mut()?;
-        let draw = |picture: &Picture<'_>| renderer.draw(picture, team);
-        Some(lend(terrain, (view, time_ms), (parts, looks, infos), draw))
-    }
-}
-
-/// The last stage of frames that have a renderer.
-fn record_drawing(house: &House, team: &Team<'_>) {
-    let mut drawing = house.drawing.lock();
-    let mut output = house.terrain.output().lock();
-    let Some(renderer) = &mut drawing.renderer else { return };
-    renderer.note_built(&output.built);
-    renderer.note_tiles(&output.tiles);
-    if let Some(view) = drawing.view.and_then(|index| output.views.get(index)) {
-        drawing.report = drawing.draw(&house.terrain, (view, output.time_ms), team);
-    }
-    let totals = drawing.renderer.as_ref().map(Renderer::device_totals);
-    output.device = totals.unwrap_or_default();
-}
-
-/// Lends what a picture of a view of a terrain is made from.
-fn lend<R>(
-    terrain: &Terrain,
-    (view, time_ms): (&ViewDraws, u32),
-    (parts, looks, infos): (&FrameParts, &Looks, &mut Vec<PatchInfo>),
-    draw: impl FnOnce(&Picture<'_>) -> R,
-) -> R {
-    infos.clear();
-    if looks.show.needs_infos() {
-        terrain.inspect(infos);
-    }
-    draw(&Picture {
-        view,
-        patches: &terrain.patches(),
-        parts,
-        time_ms,
-        show: looks.show,
-        infos,
-        overlay: &looks.overlay,
-        backdrop: looks.backdrop,
-    })
-}
-
 /// A scene with everything that it needs to run.
 pub struct Overfly {
     house: House,
     graph: Graph<House>,
     /// Its last stage where there is no renderer.
-    placed: StageId,
     workers: Arc<jobs::Workers>,
     sources: Arc<Sources>,
     ground: ResidentGround,
@@ -180,9 +114,8 @@ impl Overfly {
         let placed = add_stages(&mut graph, |house: &House| &house.terrain);
         let pages_max = terrain.limits().pages;
         Ok(Self {
-            house: House { terrain, drawing: Mutex::default() },
+            house: House { terrain, drawing: Mutex::new(Drawing::after(placed)) },
             graph,
-            placed,
             workers: Arc::new(workers.start().map_err(OpenError::Workers)?),
             ground: ResidentGround::new(settings.body, settings.sea),
             requests: Requests::new(sources.clone(), pages_max),
@@ -196,15 +129,6 @@ impl Overfly {
         })
     }
 
-    /// The renderer that shall draw from now on; its settings must be made for this scene.
-    pub fn set_renderer(&mut self, mut renderer: Renderer) {
-        renderer.note_tiles(&self.house.terrain.tiles());
-        let before = self.house.drawing.get_mut().renderer.replace(renderer);
-        if before.is_none() {
-            self.graph.stage(RECORD, &[self.placed], record_drawing);
-        }
-    }
-
     /// Runs one frame. Pages are taken out of `input.arrived`.
     ///
     /// # Errors
@@ -214,28 +138,6 @@ impl Overfly {
         input: &mut FrameInput,
         output: &mut FrameOutput,
     ) -> Result<(), FrameError> {
-        self.run(input, output, None).map(|_| ())
-    }
-
-    /// Runs one frame and draws one of its views, if there is a renderer.
-    ///
-    /// # Errors
-    /// As [`Self::frame`]; or Vulkan failed.
-    pub fn frame_drawn(
-        &mut self,
-        input: &mut FrameInput,
-        output: &mut FrameOutput,
-        view: usize,
-    ) -> Result<Option<DrawReport>, FrameError> {
-        self.run(input, output, Some(view))
-    }
-
-    fn run(
-        &mut self,
-        input: &mut FrameInput,
-        output: &mut FrameOutput,
-        view: Option<usize>,
-    ) -> Result<Option<DrawReport>, FrameError> {
         self.house.terrain.check(input).map_err(FrameError::View)?;
         if let Some(scene) = input.scene.take() {
             self.change(&scene, &mut input.arrived).map_err(FrameError::Scene)?;
@@ -247,8 +149,7 @@ impl Overfly {
         self.ground.note(input.arrived.iter().map(|page| page.key));
         let time_s = input.time_s;
         self.house.terrain.begin(input).map_err(FrameError::View)?;
-        let drawing = self.house.drawing.get_mut();
-        (drawing.view, drawing.parts) = (view, extract(&self.world, time_s));
+        self.house.drawing.get_mut().note_scene(&self.world, time_s);
         let ran = self.graph.run(&self.house, &self.workers);
         self.house.terrain.finish(output);
         self.frames += 1;
@@ -259,7 +160,7 @@ impl Overfly {
         if let Some(recorder) = &mut self.recorder {
             recorder.write(output.digest).map_err(FrameError::Record)?;
         }
-        self.house.drawing.get_mut().report.take().transpose().map_err(FrameError::Draw)
+        Ok(())
     }
 
     /// Goes over to another scene. Where more than the sun is another the terrain begins anew, tickets
@@ -300,9 +201,8 @@ impl Overfly {
             self.house.terrain = Terrain::new(scene, self.sources.generator());
             self.ground = ResidentGround::new(scene.body, scene.sea);
             arrived.clear();
-            if let Some(renderer) = &mut self.house.drawing.get_mut().renderer {
-                renderer.note_tiles(&self.house.terrain.tiles());
-            }
+            let House { terrain, drawing } = &mut self.house;
+            drawing.get_mut().begin_anew(terrain);
         }
         self.world = world_of(scene);
         self.scene = scene.clone();
@@ -335,46 +235,6 @@ impl Overfly {
     /// The workers, for threads of the host to help: see [`HostThreads::Lent`].
     pub fn crew(&self) -> Arc<jobs::Workers> {
         self.workers.clone()
-    }
-
-    /// Draws another view of the last frame, on the caller alone; `None` without a renderer or
-    /// such a view.
-    ///
-    /// # Errors
-    /// Vulkan failed.
-    pub fn draw(
-        &mut self,
-        output: &FrameOutput,
-        view: usize,
-    ) -> Result<Option<DrawReport>, DrawError> {
-        let Some(view) = output.views.get(view) else { return Ok(None) };
-        let House { terrain, drawing } = &mut self.house;
-        drawing.get_mut().draw(terrain, (view, output.time_ms), &Team::alone()).transpose()
-    }
-
-    /// Lends what a picture of a view of the last frame is made from, for a renderer that the host
-    /// keeps, as `render_vk::HostRenderer`; `None` without such a view. Such a renderer is told of
-    /// every frame's `built` and `tiles`, and of `terrain().tiles()` when it is made.
-    pub fn with_picture<R>(
-        &mut self,
-        output: &FrameOutput,
-        view: usize,
-        draw: impl FnOnce(&Picture<'_>) -> R,
-    ) -> Option<R> {
-        let view = output.views.get(view)?;
-        let House { terrain, drawing } = &mut self.house;
-        let Drawing { parts, looks, infos, .. } = drawing.get_mut();
-        Some(lend(terrain, (view, output.time_ms), (parts, looks, infos), draw))
-    }
-
-    /// What pictures show from now on; change it between frames.
-    pub fn looks_mut(&mut self) -> &mut Looks {
-        &mut self.house.drawing.get_mut().looks
-    }
-
-    /// Lends the renderer, to read pictures and messages.
-    pub fn with_renderer<R>(&mut self, read: impl FnOnce(&mut Renderer) -> R) -> Option<R> {
-        self.house.drawing.get_mut().renderer.as_mut().map(read)
     }
 
     /// The terrain: settings, limits, audits.

@@ -39,6 +39,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         depth_order: DepthOrder::Reversed,
         vertices: VertexPrecision::TwoFloat,
         morph_s: 0.0,
+        sea: false,
+        sun: false,
         imagery: false,
         tolerance_px: 1.0,
         keep_depth: false,

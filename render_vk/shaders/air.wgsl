@@ -1,13 +1,10 @@
-// The light and the air, and every constant of them.
+// Light through air, and every constant of it.
 
 // ---- Light ----
-const SUN_LIGHT: vec3<f32> = vec3<f32>(20.0, 19.4, 18.4); // irradiance before the air, arbitrary
-const SUN_COS: f32 = 0.99998919;                          // cosine of the disc's radius, 0.2665°
-const SUN_DISC: f32 = 60.0;                               // radiance of the disc over SUN_LIGHT
 const SKY_LIGHT: vec3<f32> = vec3<f32>(0.040, 0.058, 0.088); // sky on flat ground, per SUN_LIGHT
 const NIGHT_LIGHT: vec3<f32> = vec3<f32>(0.050, 0.065, 0.105); // never quite dark
 const MOON_LIGHT: vec3<f32> = vec3<f32>(2.6, 3.1, 4.2);      // irradiance of a moon, far too bright
-const EXPOSURE: f32 = 0.37;
+const MOON_ASIDE: f32 = 1.2;                          // tangent of the moon's way off the sun's axis
 
 // ---- Air: one exponential profile of molecules and haze together ----
 const RAYLEIGH: vec3<f32> = vec3<f32>(4.3e-6, 9.8e-6, 22.0e-6); // per metre at height 0, clear
@@ -17,8 +14,6 @@ const SCALE_HEIGHT_M: f32 = 8000.0;
 const AIR_TOP_M: f32 = 64000.0;                          // e⁻⁸ of the ground's density
 const TWICE_SCATTERED: vec3<f32> = vec3<f32>(0.006, 0.008, 0.011); // per SUN_LIGHT
 const TWILIGHT_COS: vec2<f32> = vec2<f32>(-0.16, 0.22);  // sun's sine: night below, day above
-
-const PI: f32 = 3.14159265;
 
 // Height of the point `t` metres along a ray from the eye, without cancellation.
 fn height_at(cos_up: f32, t: f32) -> f32 {
@@ -75,13 +70,7 @@ fn air_above(height_m: f32, cos_up: f32) -> f32 {
 
 // Light of the sun that is left at a height, `sun_cos` being the sun's cosine to the local up.
 fn sunlight(height_m: f32, sun_cos: f32) -> vec3<f32> {
-    if view.air == 0.0 { return SUN_LIGHT; }
     return SUN_LIGHT * exp(-(RAYLEIGH + HAZE) * min(air_above(height_m, sun_cos), 1e7));
-}
-
-// The local up, `offset` metres from the eye.
-fn up_at(offset: vec3<f32>) -> vec3<f32> {
-    return normalize(view.eye_up * (view.body_radius_m + view.eye_height_m) + offset);
 }
 
 // How much of the day's sky is lit for a sun at this cosine.
@@ -90,17 +79,10 @@ fn day(sun_cos: f32) -> f32 {
     return x * x;
 }
 
-// What the air between the eye and a point does to light: keeps `kept`, adds `added`.
-struct Veil {
-    kept: vec3<f32>,
-    added: vec3<f32>,
-}
-
 fn veil_until(ray: vec3<f32>, t_end: f32) -> Veil {
     var veil: Veil;
     veil.kept = vec3<f32>(1.0);
     veil.added = vec3<f32>(0.0);
-    if view.air == 0.0 { return veil; }
     let cos_up = dot(ray, view.eye_up);
     let segment = inside_air(cos_up, t_end);
     if segment.y <= 0.0 { return veil; }
@@ -108,8 +90,8 @@ fn veil_until(ray: vec3<f32>, t_end: f32) -> Veil {
     veil.kept = exp(-(RAYLEIGH + HAZE) * air.x);
     // All the scattering happens where the air's middle is.
     let sun_cos = dot(view.sun, up_at(ray * air.y));
-    let cosine = dot(ray, view.sun) * view.sun_on;
-    let g = HAZE_G * view.sun_on;
+    let cosine = dot(ray, view.sun) * SUN_ON;
+    let g = HAZE_G * SUN_ON;
     let molecules = 3.0 / (16.0 * PI) * (1.0 + cosine * cosine);
     let spread = 1.0 + g * g - 2.0 * g * cosine;
     let haze = (1.0 - g * g) / (4.0 * PI * spread * sqrt(spread));
@@ -122,9 +104,12 @@ fn veil_until(ray: vec3<f32>, t_end: f32) -> Veil {
     return veil;
 }
 
-// To display range; the picture's format does the sRGB curve. Source: Narkowicz 2015.
-fn tone(light: vec3<f32>) -> vec4<f32> {
-    let x = light * EXPOSURE;
-    let shown = (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
-    return vec4<f32>(clamp(shown, vec3<f32>(0.0), vec3<f32>(1.0)), 1.0);
+// Light on ground of this normal, over pi: `direct` of the sun, and of sky and moon.
+fn under_sky(direct: vec3<f32>, normal: vec3<f32>, up: vec3<f32>, sun_cos: f32) -> vec3<f32> {
+    let open = 0.5 + 0.5 * dot(normal, up);
+    let sky = SUN_LIGHT * SKY_LIGHT * (PI * day(sun_cos)) + NIGHT_LIGHT * PI;
+    // A moon stands opposite the sun, well off the zenith at midnight: its light shows relief.
+    let moon = normalize(MOON_ASIDE * vec3<f32>(view.sun.y, -view.sun.x, 0.3) - view.sun);
+    let moonlit = smoothstep(-0.02, 0.15, dot(moon, up)) * max(dot(normal, moon), 0.0);
+    return (direct + sky * open + MOON_LIGHT * moonlit) / PI;
 }

@@ -19,9 +19,5 @@ fn vertex(@builtin(vertex_index) index: u32) -> SkyVertex {
 fn fragment(in: SkyVertex) -> @location(0) vec4<f32> {
     let ray = normalize(in.ray);
     let veil = veil_until(ray, 1e12);
-    let cosine = dot(ray, view.sun);
-    // The disc's rim is a third of its radius wide, darker outwards as the real one.
-    let disc = smoothstep(1.0 - (1.0 - SUN_COS) * 1.3, 1.0 - (1.0 - SUN_COS) * 0.5, cosine);
-    let disc_light = SUN_LIGHT * (SUN_DISC * disc * view.sun_on);
-    return tone(disc_light * veil.kept + veil.added);
+    return tone(disc_light(ray) * veil.kept + veil.added);
 }

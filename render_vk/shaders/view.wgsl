@@ -3,9 +3,9 @@
 // ---- `ViewTerms` in src/matrices.rs, 144 bytes ----
 struct View {
     eye_hi: vec3<f32>,        // body-fixed eye, metres, as a two-float
-    air: f32,                 // 1 with an atmosphere, else 0
+    pixel_rad: f32,           // angle of a pixel in the middle of the picture
     eye_lo: vec3<f32>,
-    sea: f32,                 // 1 where ground below height 0 is water, else 0
+    tolerance_px: f32,
     right: vec3<f32>,         // unit vectors of the picture, body-fixed axes
     inverse_tan_x: f32,       // 1 / tangent of half the field of view
     up: vec3<f32>,
@@ -15,14 +15,11 @@ struct View {
     eye_up: vec3<f32>,        // geodetic normal under the eye
     eye_height_m: f32,
     sun: vec3<f32>,           // towards the light
-    sun_on: f32,              // 1 with a sun; 0: lit evenly from above the eye
-    pixel_rad: f32,           // angle of a pixel in the middle of the picture
     now_ms: u32,              // time of the flight, modulo 2^32
+    pixels_inverse: vec2<f32>, // 1 / width and height of the picture
     morph_ms: f32,            // how long a vertex takes to its own place
     show: u32,                // `Show` in src/picture.rs
-    tolerance_px: f32,
     vertices_per_patch: u32,
-    pixels_inverse: vec2<f32>, // 1 / width and height of the picture
 }
 
 // ---- `RangeTerms`, 16 bytes ----

@@ -9,7 +9,8 @@ use crate::error::{DrawError, Fault, StartError};
 use crate::imagery::{Imagery, TileStaging};
 use crate::matrices::{Fixed, ViewTerms};
 use crate::overlay::OverlayVertex;
-use crate::passes::{Beside, PassInfo, Passes};
+use crate::parts::{Asked, Lit};
+use crate::passes::{PassInfo, Passes};
 use crate::picture::{Backdrop, Picture, Show};
 use crate::record::Plan;
 use crate::rings::Rings;
@@ -122,12 +123,16 @@ impl Drawing {
         let Self { settings, passes, .. } = self;
         let info = PassInfo { device: &self.device, into: self.into, settings };
         let is_debug = picture.show != Show::Shaded;
-        let beside = Beside {
-            sky: picture.backdrop == Backdrop::Sky,
-            debug: is_debug,
-            overlay: !picture.overlay.is_empty(),
-        };
-        passes.complete(&info, beside)?;
+        passes.complete(
+            &info,
+            Asked {
+                lit: Lit::of(picture.parts),
+                imagery: settings.imagery,
+                sky: picture.backdrop == Backdrop::Sky,
+                debug: is_debug,
+                overlay: !picture.overlay.is_empty(),
+            },
+        )?;
         let mut lists: [&[u32]; RANGES_MAX as usize] = [&[]; RANGES_MAX as usize];
         let lists = &mut lists[..picture.view.ranges.len()];
         if picture.show == Show::Culled {

@@ -65,6 +65,11 @@ pub enum StartError {
         /// What is allowed.
         allowed: String,
     },
+    /// This build was made without something that is asked for.
+    Absent {
+        /// What: a feature of this crate.
+        part: &'static str,
+    },
     /// A Vulkan call failed.
     Vulkan {
         /// The call.
@@ -149,6 +154,11 @@ pub enum DrawError {
     NoWindow,
     /// Nothing was drawn yet, so there is nothing to read.
     NothingDrawn,
+    /// This build was made without something that is asked for.
+    Absent {
+        /// What: a feature of this crate.
+        part: &'static str,
+    },
     /// A Vulkan call failed.
     Vulkan {
         /// The call.
@@ -168,6 +178,7 @@ pub enum DrawError {
 /// A failure of a call, whoever made it.
 #[derive(Debug)]
 pub(crate) enum Fault {
+    Absent { part: &'static str },
     Call { call: &'static str, result: vk::Result },
     Memory { name: String, bytes: u64 },
 }
@@ -180,6 +191,7 @@ pub(crate) fn failed(call: &'static str) -> impl FnOnce(vk::Result) -> Fault {
 impl From<Fault> for StartError {
     fn from(fault: Fault) -> Self {
         match fault {
+            Fault::Absent { part } => Self::Absent { part },
             Fault::Call { call, result } => Self::Vulkan { call, result },
             Fault::Memory { name, bytes } => Self::Memory { name, bytes },
         }
@@ -189,6 +201,7 @@ impl From<Fault> for StartError {
 impl From<Fault> for DrawError {
     fn from(fault: Fault) -> Self {
         match fault {
+            Fault::Absent { part } => Self::Absent { part },
             Fault::Call { call, result } => Self::Vulkan { call, result },
             Fault::Memory { name, bytes } => Self::Memory { name, bytes },
         }
@@ -229,6 +242,7 @@ impl fmt::Display for StartError {
             Self::Setting { field, found, allowed } => {
                 write!(f, "renderer: {field} is {found}, allowed is {allowed}")
             }
+            Self::Absent { part } => write_absent(f, part),
             Self::Vulkan { call, result } => write!(f, "{call} failed: {result}"),
             Self::Memory { name, bytes } => write_memory(f, name, *bytes),
         }
@@ -277,10 +291,15 @@ impl fmt::Display for DrawError {
             Self::NoDepthKept => write!(f, "keep_depth is off, so no depth was kept"),
             Self::NoWindow => write!(f, "this renderer has no window"),
             Self::NothingDrawn => write!(f, "nothing was drawn yet"),
+            Self::Absent { part } => write_absent(f, part),
             Self::Vulkan { call, result } => write!(f, "{call} failed: {result}"),
             Self::Memory { name, bytes } => write_memory(f, name, *bytes),
         }
     }
+}
+
+fn write_absent(f: &mut fmt::Formatter<'_>, part: &str) -> fmt::Result {
+    write!(f, "this program was built without {part}: build overfly-render-vk with that feature")
 }
 
 fn write_memory(f: &mut fmt::Formatter<'_>, name: &str, bytes: u64) -> fmt::Result {

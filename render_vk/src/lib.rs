@@ -28,6 +28,7 @@ mod eye;
 mod imagery;
 mod matrices;
 mod overlay;
+mod parts;
 mod passes;
 mod picture;
 #[expect(unsafe_code, reason = "recording is calls of Vulkan")]

@@ -17,9 +17,9 @@ use overfly_core::settings::DepthOrder;
 #[repr(C)]
 pub(crate) struct ViewTerms {
     eye_hi: [f32; 3],
-    air: f32,
+    pixel_rad: f32,
     eye_lo: [f32; 3],
-    sea: f32,
+    tolerance_px: f32,
     right: [f32; 3],
     inverse_tan_x: f32,
     up: [f32; 3],
@@ -29,14 +29,12 @@ pub(crate) struct ViewTerms {
     eye_up: [f32; 3],
     eye_height_m: f32,
     sun: [f32; 3],
-    sun_on: f32,
-    pixel_rad: f32,
     now_ms: u32,
+    pixels_inverse: [f32; 2],
     morph_ms: f32,
     show: u32,
-    tolerance_px: f32,
     vertices_per_patch: u32,
-    pixels_inverse: [f32; 2],
+    _to_16: [u32; 3],
 }
 
 const _: () = assert!(size_of::<ViewTerms>() == 144);
@@ -53,15 +51,13 @@ impl ViewTerms {
     pub(crate) fn new(picture: &Picture<'_>, fixed: &Fixed) -> Self {
         let (camera, parts) = (&picture.view.camera, picture.parts);
         let eye = camera.eye.two_float();
-        let flag = |on: bool| if on { 1.0 } else { 0.0 };
         let [tan_x, tan_y] = camera.half_tangents;
         let sun = parts.sun_direction.map_or(camera.normal, DVec3::normalize);
         Self {
             eye_hi: eye.hi,
-            // Only bodies with a sea have air, until scenes name their atmosphere.
-            air: flag(parts.sea),
+            pixel_rad: narrow(1.0 / camera.pixels_per_radian),
             eye_lo: eye.lo,
-            sea: flag(parts.sea),
+            tolerance_px: fixed.tolerance_px,
             right: narrowed(camera.right),
             inverse_tan_x: narrow(1.0 / tan_x),
             up: narrowed(camera.up),
@@ -71,14 +67,12 @@ impl ViewTerms {
             eye_up: narrowed(camera.normal),
             eye_height_m: narrow(camera.height_m),
             sun: narrowed(sun),
-            sun_on: flag(parts.sun_direction.is_some()),
-            pixel_rad: narrow(1.0 / camera.pixels_per_radian),
             now_ms: picture.time_ms,
+            pixels_inverse: camera.size_px.map(|n| narrow(1.0 / f64::from(n))),
             morph_ms: fixed.morph_ms,
             show: picture.show.code(),
-            tolerance_px: fixed.tolerance_px,
             vertices_per_patch: fixed.vertices_per_patch,
-            pixels_inverse: camera.size_px.map(|n| narrow(1.0 / f64::from(n))),
+            _to_16: [0; 3],
         }
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod secondaries;
 
 use crate::drawing::{Drawing, InFlight};
 use crate::matrices::RangeTerms;
+use crate::parts::Lit;
 use crate::passes::VIEW_STAGES;
 use crate::passes::terrain::{MORPHS, PLACES, VERTICES};
 use crate::picture::{Backdrop, Picture, Show};
@@ -41,6 +42,7 @@ pub(crate) struct Plan {
     chunks: Vec<Chunk>,
     is_debug: bool,
     has_sky: bool,
+    lit: Lit,
     size_px: [u32; 2],
 }
 
@@ -61,6 +63,7 @@ impl Plan {
         cut(lists, &mut self.chunks);
         self.is_debug = picture.show != Show::Shaded;
         self.has_sky = picture.backdrop == Backdrop::Sky;
+        self.lit = Lit::of(picture.parts);
         self.size_px = picture.view.camera.size_px;
         count(self.chunks.len())
     }
@@ -158,7 +161,9 @@ impl<'a> Ready<'a> {
 
     fn sky(self, buffer: vk::CommandBuffer) {
         let range = self.in_flight.plan.farthest();
-        let pipeline = self.drawing.passes.sky.as_ref().expect("made before it is recorded");
+        let skies = &self.drawing.passes.sky;
+        let pipeline = skies[self.in_flight.plan.lit.index()].as_ref();
+        let pipeline = pipeline.expect("made before it is recorded");
         self.bind(buffer, range, pipeline.handle);
         // SAFETY: the pipeline bound above needs no vertex buffer.
         unsafe { self.drawing.device.handle.cmd_draw(buffer, 3, 1, 0, 0) };
@@ -180,11 +185,8 @@ impl<'a> Ready<'a> {
     fn chunk(self, buffer: vk::CommandBuffer, chunk: Chunk) {
         let Self { drawing, in_flight: InFlight { rings, plan, .. } } = self;
         let (arena, passes) = (&drawing.arena, &drawing.passes);
-        let pipeline = if plan.is_debug {
-            passes.debug.as_ref().expect("made before it is recorded")
-        } else {
-            &passes.terrain
-        };
+        let made = if plan.is_debug { &passes.debug } else { &passes.terrain[plan.lit.index()] };
+        let pipeline = made.as_ref().expect("made before it is recorded");
         self.bind(buffer, chunk.range, pipeline.handle);
         let row = size_of::<vk::DrawIndexedIndirectCommand>();
         let stride = u32::try_from(row).expect("a row is 20 bytes");

@@ -7,6 +7,7 @@
 
 use crate::RANGES_MAX;
 use crate::error::StartError;
+use crate::parts::{Asked, Lit};
 use ash::vk;
 use overfly_core::limits::Limits;
 use overfly_core::mesh::morph::duration_ms;
@@ -33,6 +34,11 @@ pub struct RendererSettings {
     /// How long a vertex takes to its own place in seconds, as in the scene's settings; 0: no
     /// vertex moves, and the arena has no morphs.
     pub morph_s: f64,
+    /// Whether pictures show a sea, and a sun. Programs for these are made at the start; a picture
+    /// that differs makes others when it is first drawn.
+    pub sea: bool,
+    /// See [`Self::sea`].
+    pub sun: bool,
     /// Whether imagery lies over the ground: the arena has drapes.
     pub imagery: bool,
     /// Error on the screen that may stay, for the debug view of errors.
@@ -58,12 +64,20 @@ impl RendererSettings {
             depth_order: scene.depth.order,
             vertices: scene.vertices,
             morph_s: scene.lod.morph_s,
+            sea: scene.sea,
+            sun: scene.sun.is_some(),
             imagery: !scene.imagery.is_empty(),
             tolerance_px: scene.lod.tolerance.0,
             keep_depth: false,
             frames_in_flight: 2,
             validation: false,
         }
+    }
+
+    /// What is made at the start.
+    pub(crate) fn asked(&self) -> Asked {
+        let lit = Lit { sea: self.sea, sun: self.sun };
+        Asked { lit, imagery: self.imagery, ..Asked::default() }
     }
 
     /// Whether vertices move.

@@ -5,67 +5,77 @@
 //! Keeps: nothing.
 //! Not here: pipelines (`passes`).
 
+use crate::parts::Lit;
 use overfly_core::settings::VertexPrecision;
 
-macro_rules! module {
-    ($name:literal) => {
-        words(include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")))
-    };
+/// `PROGRAMS`: names and bytes of all programs of this build.
+mod programs {
+    include!(concat!(env!("OUT_DIR"), "/programs.rs"));
 }
 
 /// For whom the ground is drawn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Ground {
     /// As one sees it.
-    Plain,
+    Plain(Lit),
     /// As one sees it, under imagery.
-    Draped,
+    Draped(Lit),
     /// Debug views.
     Debug,
 }
 
 /// Ground, `vertex`: how vertices are placed, whether they move, and for whom.
 pub(crate) fn ground(placed: VertexPrecision, morphs: bool, ground: Ground) -> Vec<u32> {
-    use Ground::{Debug, Draped, Plain};
-    use VertexPrecision::{EyeF64, TwoFloat};
-    match (placed, morphs, ground) {
-        (TwoFloat, false, Plain) => module!("ground_two_float"),
-        (TwoFloat, true, Plain) => module!("ground_two_float_morph"),
-        (TwoFloat, false, Draped) => module!("ground_two_float_drape"),
-        (TwoFloat, true, Draped) => module!("ground_two_float_morph_drape"),
-        (TwoFloat, false, Debug) => module!("ground_two_float_debug"),
-        (TwoFloat, true, Debug) => module!("ground_two_float_morph_debug"),
-        (EyeF64, false, Plain) => module!("ground_eye"),
-        (EyeF64, true, Plain) => module!("ground_eye_morph"),
-        (EyeF64, false, Draped) => module!("ground_eye_drape"),
-        (EyeF64, true, Draped) => module!("ground_eye_morph_drape"),
-        (EyeF64, false, Debug) => module!("ground_eye_debug"),
-        (EyeF64, true, Debug) => module!("ground_eye_morph_debug"),
-    }
+    let place = match placed {
+        VertexPrecision::TwoFloat => "two_float",
+        VertexPrecision::EyeF64 => "eye",
+    };
+    let morph = if morphs { "_morph" } else { "" };
+    let shown = match ground {
+        Ground::Plain(_) => "",
+        Ground::Draped(_) => "_drape",
+        Ground::Debug => "_debug",
+    };
+    program(&format!("ground_{place}{morph}{shown}"))
 }
 
 /// Ground: `fragment`.
 pub(crate) fn terrain(ground: Ground) -> Vec<u32> {
     match ground {
-        Ground::Plain => module!("terrain"),
-        Ground::Draped => module!("terrain_drape"),
-        Ground::Debug => module!("debug"),
+        Ground::Plain(lit) => program(&format!("terrain{}", suffix(lit))),
+        Ground::Draped(lit) => program(&format!("terrain{}_drape", suffix(lit))),
+        Ground::Debug => program("debug"),
     }
 }
 
 /// Sky: `vertex`, `fragment`.
-pub(crate) fn sky() -> Vec<u32> {
-    module!("sky")
+pub(crate) fn sky(lit: Lit) -> Vec<u32> {
+    program(&format!("sky{}", suffix(lit)))
 }
 
 /// Overlay: `vertex`, `fragment`.
 pub(crate) fn overlay() -> Vec<u32> {
-    module!("overlay")
+    program("overlay")
 }
 
 /// The two-sum on its own: `main`.
 pub(crate) fn self_test() -> Vec<u32> {
-    module!("self_test")
+    program("self_test")
+}
+
+fn suffix(lit: Lit) -> &'static str {
+    match (lit.sea, lit.sun) {
+        (false, false) => "",
+        (true, false) => "_sea",
+        (false, true) => "_sun",
+        (true, true) => "_sea_sun",
+    }
+}
+
+/// The words of a program that this build has: what it lacks was refused before.
+fn program(name: &str) -> Vec<u32> {
+    let found = programs::PROGRAMS.iter().find(|(program, _)| *program == name);
+    words(found.unwrap_or_else(|| panic!("no program {name}")).1)
 }
 
 fn words(bytes: &[u8]) -> Vec<u32> {
@@ -98,15 +108,21 @@ mod tests {
 
     #[test]
     fn every_float_result_of_every_shader_is_decorated_once() {
-        use VertexPrecision::{EyeF64, TwoFloat};
-        let all = [Ground::Plain, Ground::Draped, Ground::Debug];
-        let mut modules = vec![(sky(), 50), (overlay(), 5), (self_test(), 8)];
-        modules.extend(all.map(|ground| (terrain(ground), 30)));
-        for (placed, morphs) in
-            [(TwoFloat, false), (TwoFloat, true), (EyeF64, false), (EyeF64, true)]
-        {
-            modules.extend(all.map(|to| (ground(placed, morphs, to), 10)));
+        let places = programs::PROGRAMS.iter().filter(|(name, _)| name.starts_with("ground_"));
+        let (places, all) = (places.count(), programs::PROGRAMS.len());
+        if cfg!(all(feature = "debug", feature = "imagery", feature = "sea", feature = "sky")) {
+            assert!(places == 12 && all >= 18, "{places} of {all}");
         }
+        let least = |name: &str| match name {
+            "self_test" => 8,
+            "overlay" => 5,
+            "debug" => 30,
+            "sky" => 4,
+            name if name.starts_with("ground_") => 10,
+            name if name.starts_with("sky") => 5,
+            _ => 50,
+        };
+        let modules = programs::PROGRAMS.iter().map(|(name, bytes)| (words(bytes), least(name)));
         for (module, least) in modules {
             let (results, decorated) = float_results_and_decorated(&module);
             assert!(results.len() >= least, "only {} float operations", results.len());

@@ -48,30 +48,40 @@ fn sky_overlay_and_debug_views_are_made_for_the_picture_that_has_them() {
     let totals = renderer.device_totals();
     assert_eq!(ground.pipelines, 1, "the ground's alone");
 
-    // Sun and sea are numbers of the ground's own shader: the same work to the last count.
+    // Sun and sea are another program of the ground: the same work, to the last count, for the host.
     let lit = FrameParts { sun_direction: Some(DVec3::X), sea: true };
     let again = draw(&mut renderer, &patches, (NOTHING, Show::Shaded, &overlay), lit);
-    let uploaded = (ground.uploaded_patches, ground.uploaded_bytes);
-    assert_eq!((again.uploaded_patches, again.uploaded_bytes), (0, 0));
-    let (uploaded_patches, uploaded_bytes) = uploaded;
-    assert_eq!(DrawReport { uploaded_patches, uploaded_bytes, ..again }, ground);
+    assert_eq!((again.uploaded_patches, again.uploaded_bytes, again.pipelines), (0, 0, 2));
+    let DrawReport { uploaded_patches, uploaded_bytes, pipelines, .. } = ground;
+    assert_eq!(DrawReport { uploaded_patches, uploaded_bytes, pipelines, ..again }, ground);
     assert_eq!(renderer.device_totals(), totals);
 
     let sky = draw(&mut renderer, &patches, (Backdrop::Sky, Show::Shaded, &overlay), lit);
-    assert_eq!((sky.pipelines, sky.secondaries), (2, ground.secondaries + 1));
+    assert_eq!((sky.pipelines, sky.secondaries), (3, ground.secondaries + 1));
     assert_eq!(renderer.device_totals(), totals, "the sky needs no buffer");
 
     overlay.text([2.0, 2.0], 1.0, [255; 4], "more");
     let written = draw(&mut renderer, &patches, (NOTHING, Show::Shaded, &overlay), bare);
-    assert_eq!((written.pipelines, written.secondaries), (3, ground.secondaries + 1));
+    assert_eq!((written.pipelines, written.secondaries), (4, ground.secondaries + 1));
     let with_overlay = renderer.device_totals();
     assert!(with_overlay.allocations > totals.allocations, "{with_overlay:?}");
 
     let overlay = Overlay::default();
     let levels = draw(&mut renderer, &patches, (NOTHING, Show::Normals, &overlay), bare);
-    assert_eq!((levels.pipelines, levels.secondaries), (4, ground.secondaries));
+    assert_eq!((levels.pipelines, levels.secondaries), (5, ground.secondaries));
     let last = draw(&mut renderer, &patches, (NOTHING, Show::Shaded, &overlay), bare);
     assert_eq!((last.secondaries, last.commands), (ground.secondaries, ground.commands));
+}
+
+#[test]
+fn programs_of_the_scene_are_made_before_its_first_picture() {
+    let settings = RendererSettings { sea: true, sun: true, ..settings() };
+    let Some(mut renderer) = stage::renderer(&settings) else { return };
+    let patches = planet::patches(3, 4000.0);
+    let lit = FrameParts { sun_direction: Some(DVec3::X), sea: true };
+    let overlay = Overlay::default();
+    let first = draw(&mut renderer, &patches, (NOTHING, Show::Shaded, &overlay), lit);
+    assert_eq!(first.pipelines, 1, "no other than that of the settings");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! Keeps: nothing.
 //! Not here: the air before the ground, waves and grain, which are the shaders' alone.
 //!
-//! The formulas and numbers are those of `render_vk/shaders/terrain.wgsl` where its grain is 0,
+//! The formulas and numbers are those of `render_vk/shaders` where the grain is 0,
 //! which is its mean: so close ground has the same colour on the whole, without the speckle.
 //! `tests/contracts/columns.rs` holds the numbers against the shader's text, and pictures against
 //! pictures.

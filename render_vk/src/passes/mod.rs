@@ -2,7 +2,7 @@
 //!
 //! In:    a subpass to draw into, compiled shaders, settings.
 //! Out:   [`Passes`].
-//! Keeps: layouts; the ground's pipeline, others once they were asked for.
+//! Keeps: layouts; the pipelines that the settings name, others once they were asked for.
 //! Not here: recording (`record`).
 
 mod overlay;
@@ -13,6 +13,7 @@ use crate::detail::Detail;
 use crate::error::Fault;
 use crate::imagery::Imagery;
 use crate::matrices::RangeTerms;
+use crate::parts::{Asked, Lit, check};
 use crate::settings::RendererSettings;
 use crate::vk::Device;
 use crate::vk::commands::OneOff;
@@ -46,22 +47,16 @@ pub(crate) struct Passes {
     pub(crate) infos: SetLayout,
     pub(crate) imagery: Option<SetLayout>,
     pub(crate) layout: Layout,
-    pub(crate) terrain: Pipeline,
-    pub(crate) sky: Option<Pipeline>,
+    /// By [`Lit::index`].
+    pub(crate) terrain: [Option<Pipeline>; Lit::COUNT],
+    /// By [`Lit::index`].
+    pub(crate) sky: [Option<Pipeline>; Lit::COUNT],
     pub(crate) debug: Option<Pipeline>,
     pub(crate) overlay: Option<Pipeline>,
 }
 
-/// What a picture has beside the ground.
-#[derive(Clone, Copy)]
-pub(crate) struct Beside {
-    pub(crate) sky: bool,
-    pub(crate) debug: bool,
-    pub(crate) overlay: bool,
-}
-
 impl Passes {
-    /// The pipeline of the ground.
+    /// The ground's pipeline of what the settings name.
     pub(crate) fn new(info: &PassInfo<'_>, one_off: &mut OneOff) -> Result<Self, Fault> {
         let device = info.device;
         let uniform = vk::DescriptorType::UNIFORM_BUFFER;
@@ -83,30 +78,40 @@ impl Passes {
             .push_constant_ranges(&ranges);
         let layout = Layout::new(device, "picture", &create)?;
         let detail = Detail::new(device, one_off)?;
-        let terrain = terrain::pipeline(info, &layout, false)?;
-        let (sky, debug, overlay) = (None, None, None);
-        Ok(Self { detail, view, infos, imagery, layout, terrain, sky, debug, overlay })
+        let (terrain, sky) = Default::default();
+        let (debug, overlay) = (None, None);
+        let mut made = Self { detail, view, infos, imagery, layout, terrain, sky, debug, overlay };
+        made.complete(info, info.settings.asked())?;
+        Ok(made)
     }
 
-    /// Makes what a picture needs beside the ground, the first time.
-    pub(crate) fn complete(&mut self, info: &PassInfo<'_>, beside: Beside) -> Result<(), Fault> {
-        let Beside { sky, debug, overlay } = beside;
-        if sky && self.sky.is_none() {
-            self.sky = Some(sky::pipeline(info, &self.layout)?);
+    /// Makes what a picture needs, the first time.
+    pub(crate) fn complete(&mut self, info: &PassInfo<'_>, asked: Asked) -> Result<(), Fault> {
+        check(asked)?;
+        let Asked { lit, sky, debug, overlay, .. } = asked;
+        let layout = &self.layout;
+        let ground = &mut self.terrain[lit.index()];
+        if !debug && ground.is_none() {
+            *ground = Some(terrain::pipeline(info, layout, Some(lit))?);
+        }
+        let behind = &mut self.sky[lit.index()];
+        if sky && behind.is_none() {
+            *behind = Some(sky::pipeline(info, layout, lit)?);
         }
         if debug && self.debug.is_none() {
-            self.debug = Some(terrain::pipeline(info, &self.layout, true)?);
+            self.debug = Some(terrain::pipeline(info, layout, None)?);
         }
         if overlay && self.overlay.is_none() {
-            self.overlay = Some(overlay::pipeline(info, &self.layout)?);
+            self.overlay = Some(overlay::pipeline(info, layout)?);
         }
         Ok(())
     }
 
     /// How many pipelines there are.
     pub(crate) fn count(&self) -> u32 {
-        let others = [&self.sky, &self.debug, &self.overlay];
-        others.into_iter().flatten().fold(1, |count, _| count + 1)
+        let lit = self.terrain.iter().chain(&self.sky);
+        let all = lit.chain([&self.debug, &self.overlay]);
+        all.flatten().fold(0, |count, _| count + 1)
     }
 }
 

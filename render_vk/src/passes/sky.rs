@@ -7,13 +7,14 @@
 
 use super::{PassInfo, nearer};
 use crate::error::Fault;
+use crate::parts::Lit;
 use crate::shaders;
 use crate::vk::pipeline::{GraphicsInfo, Layout, Pipeline};
 use ash::vk;
 
 /// Drawn last in the farthest range, infinitely far: so only pixels without ground are shaded.
-pub(crate) fn pipeline(info: &PassInfo<'_>, layout: &Layout) -> Result<Pipeline, Fault> {
-    let words = shaders::sky();
+pub(crate) fn pipeline(info: &PassInfo<'_>, layout: &Layout, lit: Lit) -> Result<Pipeline, Fault> {
+    let words = shaders::sky(lit);
     let compare = match nearer(info.settings.depth_order) {
         vk::CompareOp::GREATER => vk::CompareOp::GREATER_OR_EQUAL,
         _ => vk::CompareOp::LESS_OR_EQUAL,

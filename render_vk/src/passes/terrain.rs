@@ -3,10 +3,11 @@
 //! In:    vertices as [`PatchVertex`], [`PatchMorph`]s, places before the eye; the view.
 //! Out:   colour and depth.
 //! Keeps: nothing.
-//! Not here: which patches (`record`), colours (`shaders/terrain.wgsl`, `shaders/debug.wgsl`).
+//! Not here: which patches (`record`), colours (`shaders`).
 
 use super::{PassInfo, nearer};
 use crate::error::Fault;
+use crate::parts::Lit;
 use crate::shaders::{self, Ground};
 use crate::vk::pipeline::{GraphicsInfo, Layout, Pipeline};
 use ash::vk;
@@ -20,17 +21,17 @@ pub(crate) const VERTICES: u32 = 0;
 pub(crate) const MORPHS: u32 = 1;
 pub(crate) const PLACES: u32 = 2;
 
-/// Depth test and write, back faces culled: the ground is closed and is seen from outside.
+/// As one sees it in a light, or for debug views. Depth test and write, back faces culled: the ground is closed and is seen from outside.
 pub(crate) fn pipeline(
     info: &PassInfo<'_>,
     layout: &Layout,
-    is_debug: bool,
+    lit: Option<Lit>,
 ) -> Result<Pipeline, Fault> {
     let (placed, morphs) = (info.settings.vertices, info.settings.morphs());
-    let ground = match (is_debug, info.settings.imagery) {
-        (true, _) => Ground::Debug,
-        (false, true) => Ground::Draped,
-        (false, false) => Ground::Plain,
+    let ground = match (lit, info.settings.imagery) {
+        (None, _) => Ground::Debug,
+        (Some(lit), true) => Ground::Draped(lit),
+        (Some(lit), false) => Ground::Plain(lit),
     };
     let in_eye = placed == VertexPrecision::EyeF64;
     let mut bindings = vec![binding(VERTICES, size_of::<PatchVertex>())];
@@ -44,7 +45,7 @@ pub(crate) fn pipeline(
         attributes.push(attribute(PLACES, 0, vk::Format::R32G32B32_SFLOAT, 0));
     }
     let graphics = GraphicsInfo {
-        name: if is_debug { "terrain, debug" } else { "terrain" },
+        name: if lit.is_none() { "terrain, debug" } else { "terrain" },
         words: [&shaders::ground(placed, morphs, ground), &shaders::terrain(ground)],
         into: info.into,
         bindings: &bindings,

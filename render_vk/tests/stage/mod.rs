@@ -28,6 +28,8 @@ pub fn settings(size_px: [u32; 2], patches_max: u32) -> RendererSettings {
         depth_order: DepthOrder::Reversed,
         vertices: VertexPrecision::TwoFloat,
         morph_s: 0.0,
+        sea: false,
+        sun: false,
         imagery: false,
         tolerance_px: 1.0,
         keep_depth: false,
