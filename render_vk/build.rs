@@ -14,11 +14,14 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use std::fmt::Write as _;
 use std::{env, fs, path::PathBuf};
 
+/// Names of files or of features.
+type Names = &'static [&'static str];
+
 /// Vertex programs of the ground: how vertices are placed × whether they move × for whom, which a
 /// feature may be needed for.
-const PLACES: [(&str, &[&str]); 2] =
+const PLACES: [(&str, Names); 2] =
     [("two_float", &["two_float", "place_two_float"]), ("eye", &["place_eye"])];
-const ENTRIES: [(&str, Option<&str>, &[&str]); 6] = [
+const ENTRIES: [(&str, Option<&str>, Names); 6] = [
     ("", None, &["point", "vertex"]),
     ("_morph", None, &["point", "morph", "vertex_morph"]),
     ("_drape", Some("imagery"), &["point_drape", "patch", "drape_place", "vertex_drape"]),
@@ -32,7 +35,7 @@ const ENTRIES: [(&str, Option<&str>, &[&str]); 6] = [
 ];
 
 /// Light: with sea and air or not × with a sun or not. What lights, what it falls on.
-const LIT: [(&str, &[&str], [&[&str]; 2]); 4] = [
+const LIT: [(&str, Names, [Names; 2]); 4] = [
     ("", &[], [&["light", "no_sun", "no_air"], &["regolith", "no_sea"]]),
     ("_sea", &["sea"], [&["light", "no_sun", "air"], &["land", "no_glint", "sea"]]),
     ("_sun", &["sun"], [&["light", "sun", "no_air"], &["regolith", "no_sea"]]),

@@ -35,6 +35,8 @@ pub(crate) struct Drawing {
     renderer: Option<Renderer>,
     /// The stage that pictures are recorded after.
     placed: StageId,
+    /// Of the last frame.
+    time_s: f64,
     parts: FrameParts,
     looks: Looks,
     infos: Vec<PatchInfo>,
@@ -49,6 +51,7 @@ impl Drawing {
         Self {
             renderer: None,
             placed,
+            time_s: 0.0,
             parts: FrameParts::default(),
             looks: Looks::default(),
             infos: Vec::new(),
@@ -57,9 +60,12 @@ impl Drawing {
         }
     }
 
-    /// What of the scene pictures of this frame show.
+    /// A frame of this time begins. Only a renderer asks the world what pictures of it show.
     pub(crate) fn note_scene(&mut self, world: &hecs::World, time_s: f64) {
-        self.parts = extract(world, time_s);
+        self.time_s = time_s;
+        if self.renderer.is_some() {
+            self.parts = extract(world, time_s);
+        }
     }
 
     /// The terrain is another one.
@@ -161,7 +167,9 @@ impl Overfly {
     ) -> Result<Option<DrawReport>, DrawError> {
         let Some(view) = output.views.get(view) else { return Ok(None) };
         let House { terrain, drawing } = &mut self.house;
-        drawing.get_mut().draw(terrain, (view, output.time_ms), &Team::alone()).transpose()
+        let drawing = drawing.get_mut();
+        drawing.parts = extract(&self.world, drawing.time_s);
+        drawing.draw(terrain, (view, output.time_ms), &Team::alone()).transpose()
     }
 
     /// Lends what a picture of a view of the last frame is made from, for a renderer that the host
@@ -175,8 +183,9 @@ impl Overfly {
     ) -> Option<R> {
         let view = output.views.get(view)?;
         let House { terrain, drawing } = &mut self.house;
-        let Drawing { parts, looks, infos, .. } = drawing.get_mut();
-        Some(lend(terrain, (view, output.time_ms), (parts, looks, infos), draw))
+        let Drawing { time_s, looks, infos, .. } = drawing.get_mut();
+        let parts = extract(&self.world, *time_s);
+        Some(lend(terrain, (view, output.time_ms), (&parts, looks, infos), draw))
     }
 
     /// What pictures show from now on; change it between frames.

@@ -212,7 +212,7 @@ impl Drop for Loader {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "ingest"))]
 mod tests {
     use super::*;
     use crate::core::settings::{SceneSettings, SourceSettings};

@@ -124,6 +124,7 @@ fn unsafe_stands_only_where_it_may() {
         "examples/host_vulkan/",
         "examples/own_vulkan.rs",
         "examples/cockpit.rs",
+        "examples/sparing/",
         "tests/contracts/hosting.rs",
         "capi/src/border.rs",
         "capi/src/callbacks.rs",

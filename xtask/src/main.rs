@@ -10,6 +10,7 @@ mod capi;
 mod examples;
 mod python;
 mod set_up;
+mod sparing;
 mod steps;
 mod trade;
 
@@ -26,6 +27,8 @@ commands:
   test   sets up drawing with Vulkan's validation layers and runs every test
   examples
          builds and runs the examples in C, C++ and Python against what is installed for them
+  sparing
+         counts what a bare scene costs, in this build and in builds without what it has not
   trade  measures what settings cost over the three flights, into docs/trade.md
   capi --prefix DIR [--dev]
          builds the library for C and installs it below DIR, with header and pkg-config file
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         ["examples"] => {
             examples::examples(&root(), &cargo(), set_up(&[DRAWING, VALIDATION].concat()))
         }
+        ["sparing"] => sparing::sparing(&root(), &cargo(), set_up(&[DRAWING, VALIDATION].concat())),
         ["trade"] => trade::trade(&root(), &cargo(), &overfly(&root()).display().to_string()),
         ["capi", ref words @ ..] => match capi::Install::parse(words) {
             Ok(install) => install.install(&root(), &cargo()),
@@ -55,7 +59,7 @@ fn main() -> ExitCode {
             Ok(())
         }
         [] => return refuse("a command is missing"),
-        ["demo" | "test" | "examples" | "trade" | "python" | "help", ..] => {
+        ["demo" | "test" | "examples" | "sparing" | "trade" | "python" | "help", ..] => {
             return refuse("a command takes no arguments");
         }
         [word, ..] => return refuse(&format!("there is no command {word}")),
